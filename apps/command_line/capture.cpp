@@ -9,6 +9,7 @@
 
 #include "command_line/headings.h"
 #include "command_line/terminal.h"
+#include "io/recording.h"
 #include "io/skeleton_align.h"
 #include "io/skeleton_file.h"
 #include "io/skeleton_rate.h"
@@ -231,9 +232,16 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
 }
 
 Result<void> Capture::find_files() {
-    auto files = find_sequence(options_.inputs, {options_.ignored});
+    auto files = find_frames(options_.inputs, {options_.ignored});
     if (!files) return tl::unexpected(files.error());
     files_ = std::move(*files);
+    if (files_.recording) {
+        rate_of_recording_ = files_.recording->rate;
+        note(fmt::format("{}: {}, {}", input_name(options_), files_.recording->format,
+                         counted(files_.paths.size(), "frame")));
+        if (files_.recording->sound)
+            note(fmt::format("its sound is taken by --audio {}", files_.recording->sound->string()));
+    }
     for (const auto& remark : files_.remarks)
         (remark.is_loss ? warn : note)(fmt::format("{}: {}", input_name(options_), remark.text));
     places_ = places_in_time(files_);
@@ -299,7 +307,10 @@ Result<void> Capture::find_times() {
     if (!options_.timestamps.empty()) {
         if (auto found = find_listed_times(); !found) return found;
     } else if (!pipe_ && options_.fps.numerator == 0) {
-        find_times_in_files();
+        if (files_.recording)
+            file_times_ = files_.recording->microseconds;
+        else
+            find_times_in_files();
     }
     return {};
 }
@@ -322,6 +333,8 @@ Result<void> Capture::find_poses() {
         rate_ = {static_cast<std::uint32_t>(std::lround(beside.fps * 1000)), 1000};
         if (!beside.note.empty())
             (beside.is_doubtful ? warn : note)(fmt::format("{}: {}", options_.skeleton, beside.note));
+    } else if (rate_of_recording_.numerator > 0) {
+        rate_ = rate_of_recording_;
     } else if (!track) {
         rate_is_told_ = false;
     }
@@ -384,7 +397,7 @@ Result<void> Capture::find_first() {
 // From the first mesh, in its file's unit.
 Result<void> Capture::find_unit() {
     const bool guessed = !options_.unit && options_.height == 0 && options_.scale == 1;
-    const auto of_format = pipe_ ? std::nullopt : unit_of_format(files_.paths[peeked_at_]);
+    const auto of_format = pipe_ ? std::nullopt : unit_of_frames(files_, peeked_at_);
     const auto unit = options_.unit ? *options_.unit : of_format.value_or(guess_unit(peeked_->mesh));
     millimetres_per_unit_ = options_.scale * millimetres_per(unit);
     const double tall = height_of(peeked_->mesh, options_.up);
@@ -396,8 +409,9 @@ Result<void> Capture::find_unit() {
     constexpr double shortest = 400, tallest = 2600;  // millimetres, of people
     const double millimetres = tall * millimetres_per_unit_;
     if (guessed && tall > 0) {
+        const std::string format = files_.recording ? files_.recording->format : "glTF";
         const auto looks = fmt::format("{} in {}, which makes the subject {} tall",
-                                       of_format ? "glTF files are" : "the meshes look as if they were",
+                                       of_format ? format + " files are" : "the meshes look as if they were",
                                        names_of(unit).name, length_text(millimetres));
         if (millimetres < shortest || millimetres > tallest)
             warn(looks + "; if that is wrong, give --unit or --height");
@@ -412,15 +426,17 @@ Result<void> Capture::take_off_shift() {
     const auto shift = shift_of(peeked_->mesh, millimetres_per_unit_);
     if (shift == GlobalShift{}) return {};
     if (pipe_) {
-        warn("the meshes are so far from their origin that floats lose of their shape; from files, which are read "
-             "twice, a shift is taken off first");
+        warn(
+            "the meshes are so far from their origin that floats lose of their shape; from files, which are read "
+            "twice, a shift is taken off first");
         return {};
     }
     shift_ = shift;
-    note(fmt::format("the meshes are far from their origin: {:.0f}, {:.0f}, {:.0f} m are taken off, kept in the stream and "
-                     "added again by decode",
-                     static_cast<double>(shift[0]) / 1000, static_cast<double>(shift[1]) / 1000,
-                     static_cast<double>(shift[2]) / 1000));
+    note(fmt::format(
+        "the meshes are far from their origin: {:.0f}, {:.0f}, {:.0f} m are taken off, kept in the stream and "
+        "added again by decode",
+        static_cast<double>(shift[0]) / 1000, static_cast<double>(shift[1]) / 1000,
+        static_cast<double>(shift[2]) / 1000));
     return {};
 }
 
@@ -435,7 +451,7 @@ void Capture::find_kind() {
         const auto place = begin_ + k * (frames_ - 1) / samples;
         if (place == peeked_at_ || (k > 1 && place == begin_ + (k - 1) * (frames_ - 1) / samples)) continue;
         MeshFindings others;
-        const auto mesh = read_mesh(files_.paths[place], mesh_options(), &others);
+        const auto mesh = read_mesh_of(files_, place, mesh_options(), &others);
         // Whether it has its image is said once it is encoded.
         if (mesh) kind_.add(*mesh, others, peeked_->texture != nullptr);
     }
@@ -512,13 +528,16 @@ void Capture::tell_of_texture() const {
                 "the meshes have no texture coordinates, so there is nothing to do for --texture-as or "
                 "--texture-origin");
     } else if (!wanted().idle_texcoords && (image.empty() || options_.texture.files == "none")) {
-        note(options_.texture.files == "none"
-                 ? std::string("the texture coordinates are left out with their image; --texture-as coordinates keeps them")
-                 : std::string("the meshes have texture coordinates, but no image was found for them, so these are left "
-                               "out; --texture gives its place, --texture-as coordinates keeps them"));
+        note(
+            options_.texture.files == "none"
+                ? std::string(
+                      "the texture coordinates are left out with their image; --texture-as coordinates keeps them")
+                : std::string("the meshes have texture coordinates, but no image was found for them, so these are left "
+                              "out; --texture gives its place, --texture-as coordinates keeps them"));
     } else if (options_.texture.files == "none") {
-        note("the texture coordinates are encoded, without an image; meshes that are written without them take fewer "
-             "bits");
+        note(
+            "the texture coordinates are encoded, without an image; meshes that are written without them take fewer "
+            "bits");
     } else if (image.empty()) {
         note("the meshes have texture coordinates, but no image was found for them; --texture gives its place");
     } else if (options_.texture_as == TextureAs::coordinates) {
@@ -575,8 +594,7 @@ MeshFileOptions Capture::mesh_options() const {
     MeshFileOptions out;
     out.millimetres_per_unit = millimetres_per_unit_;
     out.reading.colour_range = colour_range_;
-    for (std::size_t c = 0; c < 3; ++c)
-        out.reading.origin[c] = static_cast<double>(shift_[c]) / millimetres_per_unit_;
+    for (std::size_t c = 0; c < 3; ++c) out.reading.origin[c] = static_cast<double>(shift_[c]) / millimetres_per_unit_;
     return out;
 }
 

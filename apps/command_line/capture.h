@@ -70,7 +70,7 @@ struct CaptureOptions {
     double skeleton_offset = 0;      // seconds added to the skeleton's clock
     TextureOptions texture;          // where images are
     TextureAs texture_as = TextureAs::by_default;
-    bool keeps_idle_texcoords = true;  // texture coordinates for which no image is used, unless asked for
+    bool keeps_idle_texcoords = true;        // texture coordinates for which no image is used, unless asked for
     WhileBusy while_busy = WhileBusy::wait;  // of standard input: what becomes of frames that come faster than they are
                                              // taken
 };
@@ -136,7 +136,7 @@ public:
     // Where the first frame's lowest vertex lies along the axis that is up, mm; 0 if none is known to be.
     double lowest() const { return lowest_; }
     double millimetres_per_unit() const { return millimetres_per_unit_; }  // scaling included
-    const GlobalShift& global_shift() const { return shift_; }              // mm, taken off the files' positions
+    const GlobalShift& global_shift() const { return shift_; }             // mm, taken off the files' positions
 
 private:
     Result<void> find_files();
@@ -192,6 +192,7 @@ private:
     FrameTimes listed_;                     // of --timestamps
     std::vector<std::int64_t> file_times_;  // microseconds, of each file, where they are not regular
     FrameRate rate_{30000, 1000};
+    FrameRate rate_of_recording_;      // that a recording says; numerator 0: it does not
     bool rate_is_told_ = true;         // else the first mesh on standard input may say it
     double millimetres_per_unit_ = 0;  // 0: not known yet
     GlobalShift shift_{};

@@ -73,12 +73,14 @@ std::string CaptureKind::unlike(const Mesh& mesh, bool has_texture) const {
     constexpr double most = 10;  // a person who crouches or spreads the arms changes by less than two
     const double size = size_of(mesh);
     if (size_ > 0 && size > 0 && std::max(size / size_, size_ / size) > most)
-        return size < size_ ? fmt::format("it is {:.0f} times smaller than the first frame: of another capture, or in "
-                                          "another unit",
-                                          size_ / size)
-                            : fmt::format("it is {:.0f} times larger than the first frame: of another capture, or in "
-                                          "another unit",
-                                          size / size_);
+        return size < size_ ? fmt::format(
+                                  "it is {:.0f} times smaller than the first frame: of another capture, or in "
+                                  "another unit",
+                                  size_ / size)
+                            : fmt::format(
+                                  "it is {:.0f} times larger than the first frame: of another capture, or in "
+                                  "another unit",
+                                  size / size_);
     return {};
 }
 

@@ -229,31 +229,36 @@ void advise(const Report& report, Judgement& j) {
     if (j.repeated > 0)
         say(fmt::format("{} what the one before has: the rig's rate may be lower than its recording's",
                         counted(j.repeated, "frame") + (j.repeated == 1 ? " repeats" : " repeat")));
-    if (j.strays.middle >= 1)
-        say("pieces float far from the subject: cut the reconstruction to a box around it");
+    if (j.strays.middle >= 1) say("pieces float far from the subject: cut the reconstruction to a box around it");
     if (j.specks.middle >= 5)
-        say(fmt::format("{:.0f} specks a frame: remove small pieces where the surface is made; each costs bits in every "
-                        "frame and flashes",
-                        j.specks.middle));
+        say(fmt::format(
+            "{:.0f} specks a frame: remove small pieces where the surface is made; each costs bits in every "
+            "frame and flashes",
+            j.specks.middle));
     if (j.unused.middle > 0.01 * j.vertices.middle)
-        say(fmt::format("{:.0f} vertices a frame are in no triangle: they cost bits with --profile topology and show "
+        say(
+            fmt::format("{:.0f} vertices a frame are in no triangle: they cost bits with --profile topology and show "
                         "nothing",
                         j.unused.middle));
     if (j.doubled > 0.01) say("triangles are there twice, once for each side: export single-sided surfaces");
     if (j.turned > 0.01) say("triangles are wound either way: unify the orientation, else lit renderings are spotted");
     if (j.border.middle > 0.5 * j.height.middle)
-        say(fmt::format("the surface is open, {:.1f} m of border a frame: fill holes, or add cameras, where the whole "
+        say(
+            fmt::format("the surface is open, {:.1f} m of border a frame: fill holes, or add cameras, where the whole "
                         "person is to be seen",
                         j.border.middle / 1000));
     if (j.area_flicker > 0.02)
-        say(fmt::format("the surface's area changes by {:.1f} % from frame to frame: parts come and go, which costs I- "
+        say(
+            fmt::format("the surface's area changes by {:.1f} % from frame to frame: parts come and go, which costs I- "
                         "and patched frames; steadier masks and depth help",
                         100 * j.area_flicker));
     if (j.light_flicker > 0.02)
-        say(fmt::format("brightness changes by {:.1f} % from frame to frame: fix the cameras' exposure and white "
+        say(
+            fmt::format("brightness changes by {:.1f} % from frame to frame: fix the cameras' exposure and white "
                         "balance",
                         100 * j.light_flicker));
-    if (count_of(report, [](const auto& f) { return !f.colours && f.texture_width == 0; }) == j.readable && j.readable > 0)
+    if (count_of(report, [](const auto& f) { return !f.colours && f.texture_width == 0; }) == j.readable &&
+        j.readable > 0)
         say("there are no colours: neither at vertices nor in an image that was found");
     if (!report.trial.failed.empty()) say("encoding failed: " + report.trial.failed);
 }
@@ -263,9 +268,8 @@ Judgement judge(const Report& report) {
     const auto spread = [&](auto value) { return spread_of(values_of(report, value)); };
     j.vertices = spread([](const auto& f) { return f.facts.vertices; });
     j.triangles = spread([](const auto& f) { return f.facts.triangles; });
-    j.height = spread([](const auto& f) {
-        return std::max(f.facts.high[1] - f.facts.low[1], f.facts.high[2] - f.facts.low[2]);
-    });
+    j.height = spread(
+        [](const auto& f) { return std::max(f.facts.high[1] - f.facts.low[1], f.facts.high[2] - f.facts.low[2]); });
     j.edge = spread([](const auto& f) { return f.facts.mean_edge; });
     j.border = spread([](const auto& f) { return f.facts.border; });
     j.pieces = spread([](const auto& f) { return f.facts.pieces; });
@@ -302,8 +306,8 @@ std::string attributes_of(const Report& report, const Judgement& j) {
     add("normals", count_of(report, [](const auto& f) { return f.normals; }));
     add("texture coordinates", count_of(report, [](const auto& f) { return f.texcoords; }));
     const auto images = count_of(report, [](const auto& f) { return f.texture_width > 0; });
-    const auto first = std::find_if(report.frames.begin(), report.frames.end(),
-                                    [](const auto& f) { return f.texture_width > 0; });
+    const auto first =
+        std::find_if(report.frames.begin(), report.frames.end(), [](const auto& f) { return f.texture_width > 0; });
     if (images > 0)
         add(fmt::format("images of {} x {} pixels", first->texture_width, first->texture_height).c_str(), images);
     return out.empty() ? "none" : out;
@@ -314,11 +318,12 @@ void print_report(const Report& report, const Judgement& j, const std::string& i
     fmt::print("{}: {} at {:g} frames/s, {:.2f} s\n", input, counted(report.frames.size(), "frame"), report.fps,
                static_cast<double>(last.timestamp_us - report.frames.front().timestamp_us) / 1e6 + 1 / report.fps);
     fmt::print("  vertices     {}\n  triangles    {}\n", text_of(j.vertices), text_of(j.triangles));
-    fmt::print("  size         {:.0f} mm tall, edges of {:.1f} mm, in units of {:g} mm\n", j.height.middle, j.edge.middle,
-               report.millimetres_per_unit);
+    fmt::print("  size         {:.0f} mm tall, edges of {:.1f} mm, in units of {:g} mm\n", j.height.middle,
+               j.edge.middle, report.millimetres_per_unit);
     if (report.shift != GlobalShift{})
-        fmt::print("  place        {:.0f}, {:.0f}, {:.0f} m from the origin\n", static_cast<double>(report.shift[0]) / 1000,
-                   static_cast<double>(report.shift[1]) / 1000, static_cast<double>(report.shift[2]) / 1000);
+        fmt::print("  place        {:.0f}, {:.0f}, {:.0f} m from the origin\n",
+                   static_cast<double>(report.shift[0]) / 1000, static_cast<double>(report.shift[1]) / 1000,
+                   static_cast<double>(report.shift[2]) / 1000);
     fmt::print("  attributes   {}\n", attributes_of(report, j));
     fmt::print("  pieces       {}, of them specks {}, far away {}\n", text_of(j.pieces), text_of(j.specks),
                text_of(j.strays));
@@ -368,29 +373,28 @@ void print_json(const Report& report, const Judgement& j) {
                           {"texcoords", f.texcoords},
                           {"texture", {f.texture_width, f.texture_height}},
                           {"repeats", f.repeats}});
-    fmt::print("{}\n",
-               nlohmann::json{{"frames", frames},
-                              {"fps", report.fps},
-                              {"unit_mm", report.millimetres_per_unit},
-                              {"global_shift_mm", report.shift},
-                              {"bad_frames", j.bad},
-                              {"missing_frames", j.missing},
-                              {"repeated_frames", j.repeated},
-                              {"vertices", json_of(j.vertices)},
-                              {"triangles", json_of(j.triangles)},
-                              {"height_mm", json_of(j.height)},
-                              {"border_mm", json_of(j.border)},
-                              {"doubled_share", j.doubled},
-                              {"turned_share", j.turned},
-                              {"area_flicker", j.area_flicker},
-                              {"light_flicker", j.light_flicker},
-                              {"trial",
-                               {{"frames", report.trial.frames},
-                                {"mbit_per_second", report.trial.megabits_per_second},
-                                {"intra_frames", report.trial.intra},
-                                {"patched_frames", report.trial.patched}}},
-                              {"advice", j.advice}}
-                   .dump(2));
+    fmt::print("{}\n", nlohmann::json{{"frames", frames},
+                                      {"fps", report.fps},
+                                      {"unit_mm", report.millimetres_per_unit},
+                                      {"global_shift_mm", report.shift},
+                                      {"bad_frames", j.bad},
+                                      {"missing_frames", j.missing},
+                                      {"repeated_frames", j.repeated},
+                                      {"vertices", json_of(j.vertices)},
+                                      {"triangles", json_of(j.triangles)},
+                                      {"height_mm", json_of(j.height)},
+                                      {"border_mm", json_of(j.border)},
+                                      {"doubled_share", j.doubled},
+                                      {"turned_share", j.turned},
+                                      {"area_flicker", j.area_flicker},
+                                      {"light_flicker", j.light_flicker},
+                                      {"trial",
+                                       {{"frames", report.trial.frames},
+                                        {"mbit_per_second", report.trial.megabits_per_second},
+                                        {"intra_frames", report.trial.intra},
+                                        {"patched_frames", report.trial.patched}}},
+                                      {"advice", j.advice}}
+                           .dump(2));
 }
 
 Result<void> check(const Options& options) {
@@ -404,8 +408,8 @@ Result<void> check(const Options& options) {
     else
         print_report(*report, judgement, input_name(options.capture));
     if (judgement.bad == 0) return {};
-    return fail(ErrorKind::bad_input, fmt::format("{} of {} cannot be encoded", judgement.bad,
-                                                  counted(report->frames.size(), "frame")));
+    return fail(ErrorKind::bad_input,
+                fmt::format("{} of {} cannot be encoded", judgement.bad, counted(report->frames.size(), "frame")));
 }
 
 }  // namespace

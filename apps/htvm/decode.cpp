@@ -158,7 +158,8 @@ private:
         const auto path = output_path(names_, 0);
         const auto in_file = [&](const Error& error) { return fail(error.kind, path.string() + ": " + error.message); };
         if (!animation_) {
-            GltfAnimationOptions options{millimetres_per_unit, sequence.up, path.stem().string(), {}, sequence.global_shift};
+            GltfAnimationOptions options{
+                millimetres_per_unit, sequence.up, path.stem().string(), {}, sequence.global_shift};
             for (const auto& [key, value] : sequence.metadata) {
                 if (key == "title") options.title = value;
                 if (key == "rights") options.rights = value;

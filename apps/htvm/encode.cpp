@@ -401,7 +401,8 @@ Result<void> conclude(const Passes& passes, const Outcome& outcome, StreamOutput
            output.publishing(), passes.are_timed() ? &deadline : nullptr);
     if (passes.log)
         if (auto finished = passes.log->finish(); !finished) return finished;
-    if (const auto missed = missed_rate(rate, output.bytes(), seconds_of(summary, passes.capture.fps())); !missed.empty())
+    if (const auto missed = missed_rate(rate, output.bytes(), seconds_of(summary, passes.capture.fps()));
+        !missed.empty())
         return fail(ErrorKind::limit, fmt::format("{} is complete, but {}", passes.plan.output.place, missed));
     if (rate.dropped.empty()) return {};
     return fail(ErrorKind::limit,

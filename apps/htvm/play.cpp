@@ -16,7 +16,7 @@
 #include "encode.h"
 #include "io/child_program.h"
 #include "io/number_text.h"
-#include "io/sequence.h"
+#include "io/recording.h"
 #include "live/server/player_files.h"
 #include "live/server/server.h"
 
@@ -56,7 +56,7 @@ struct TemporaryFolder {
 
 Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeRequest request,
                                 TemporaryFolder& folder) {
-    if (const auto files = find_sequence(inputs); !files) return tl::unexpected(files.error());
+    if (const auto files = find_frames(inputs); !files) return tl::unexpected(files.error());
     if (!folder.make()) return fail(ErrorKind::bad_input, "there is no place for a temporary file (TMPDIR)");
     auto capture = fs::absolute(inputs[0]).lexically_normal();
     if (capture.filename().empty()) capture = capture.parent_path();

@@ -15,6 +15,7 @@
 #include "htvm/frame_numbers.hpp"
 #include "htvm/picture_decoder.hpp"
 #include "io/mesh_file.h"
+#include "io/recording.h"
 #include "io/sequence.h"
 #include "io/texture_colours.h"
 #include "stream_file.h"
@@ -160,7 +161,7 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
                 name + " is a stream, whose texture is inside; --texture and --texture-origin are for mesh files");
         return open_stream(name, options.limits);
     }
-    const auto files = find_sequence(names);
+    const auto files = find_frames(names);
     if (!files) return tl::unexpected(files.error());
     MeshSource source;
     source.name = names.size() == 1 ? name : "the files";
@@ -172,15 +173,15 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
     if (auto found = find_times(source, *files, options.timestamps); !found) return tl::unexpected(found.error());
     auto textures = TextureFiles::open(options.texture, *files);
     if (!textures) return tl::unexpected(textures.error());
-    source.mesh_at = [paths = files->paths, textures = std::move(*textures)](
+    source.mesh_at = [meshes = *files, textures = std::move(*textures)](
                          MeshSource& self, std::size_t position) mutable -> Result<TexturedMesh> {
         if (self.guesses_unit || self.finds_shift) {
-            const auto mesh = read_mesh(paths[position]);
+            const auto mesh = read_mesh_of(meshes, position);
             if (!mesh) return tl::unexpected(mesh.error());
             if (std::exchange(self.guesses_unit, false))
-                self.millimetres_per_unit = millimetres_per(likely_unit(paths[position], *mesh));
-            if (std::exchange(self.finds_shift, false))
-                self.global_shift = shift_of(*mesh, self.millimetres_per_unit);
+                self.millimetres_per_unit =
+                    millimetres_per(unit_of_frames(meshes, position).value_or(guess_unit(*mesh)));
+            if (std::exchange(self.finds_shift, false)) self.global_shift = shift_of(*mesh, self.millimetres_per_unit);
         }
         MeshFileOptions file_options;
         file_options.millimetres_per_unit = self.millimetres_per_unit;

@@ -35,8 +35,8 @@ struct MeshSource {
     std::optional<SpaceBounds> bounds;  // mm, of all frames of a stream that says so
     double millimetres_per_unit = 1;    // the unit that files are in, or that a stream's capture was in
     bool guesses_unit = false;          // of files: from the first one that is read
-    GlobalShift global_shift{};         // mm: off the capture's coordinates, of files what is taken off as they are read
-    bool finds_shift = false;           // of files: from the first one that is read
+    GlobalShift global_shift{};  // mm: off the capture's coordinates, of files what is taken off as they are read
+    bool finds_shift = false;    // of files: from the first one that is read
     // The mesh in mm of the frame at this position of the sequence, with its texture if it has one, and then with the
     // texture's colours at its vertices too. Positions must ascend from call to call.
     std::function<Result<TexturedMesh>(MeshSource&, std::size_t position)> mesh_at;

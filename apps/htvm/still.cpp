@@ -68,7 +68,8 @@ Result<void> still(const Options& options) {
     if (!textured) return tl::unexpected(textured.error());
     const Mesh* mesh = &textured->mesh;
     if (const auto ok = check_measurable(*mesh, source->name); !ok) return ok;
-    const auto cameras = cameras_round(bounding_box(*mesh), upright_views(options.picture, *source, first ? first->mesh : *mesh));
+    const auto cameras =
+        cameras_round(bounding_box(*mesh), upright_views(options.picture, *source, first ? first->mesh : *mesh));
     if (!cameras) return tl::unexpected(cameras.error());
     const internal::ThreadPool pool(options.picture.threads);
     Canvas canvas;

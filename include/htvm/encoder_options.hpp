@@ -112,8 +112,8 @@ struct EncoderOptions {
     Profile profile = Profile::tracked;
     double quality = default_quality;  // 0 to 100: the steps of positions and colours, see quality_steps(); higher is
                                        // finer. Under rate control it follows from the rate or the error instead
-    double geometry_step = 0;    // mm: cell size of the position quantiser, about twice its errors; 0: by the quality
-    double colour_step = 0;      // levels of 255, >= 1: cell size of the colour quantiser; 0: by the quality
+    double geometry_step = 0;  // mm: cell size of the position quantiser, about twice its errors; 0: by the quality
+    double colour_step = 0;    // levels of 255, >= 1: cell size of the colour quantiser; 0: by the quality
     CapturedNormals normals = CapturedNormals::automatic;
     double lambda = 0.12;        // squared error that is worth one bit, in units of step^2; 0: always the nearest
                                  // codeword
@@ -138,7 +138,7 @@ struct EncoderOptions {
     UpAxis up = UpAxis::unknown;          // the direction of the subject's head
     std::optional<double> floor;          // mm: the floor's coordinate on the axis that is up, which must be known
     std::vector<MetadataEntry> metadata;  // sent with every sequence header: keep it short in live streams
-    GlobalShift global_shift{};  // mm: what the caller took off the capture's coordinates, kept for decoders
+    GlobalShift global_shift{};           // mm: what the caller took off the capture's coordinates, kept for decoders
     Skeleton skeleton;          // without bones: the capture has no skeleton, and one bone that spans the mesh is used
     std::vector<double> radii;  // mm, one per bone, from calibrate(); empty: calibrated on the first frame
     std::optional<ExternalIntraCoder> intra_coder;  // codes I-frames; none: TFAN

@@ -7,8 +7,8 @@
 //       option.get(options)));
 //   if (auto set = htvm::set_option(options, "tracked.node_spacing", "60"); !set) show(set.error().message);
 //
-// Not in the list, because they are not numbers, words or switches: the profile, runner, floor, metadata, global shift, skeleton,
-// radii, intra_coder, first_pass, texture.
+// Not in the list, because they are not numbers, words or switches: the profile, runner, floor, metadata, global shift,
+// skeleton, radii, intra_coder, first_pass, texture.
 #pragma once
 
 #include <cstdint>

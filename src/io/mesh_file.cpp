@@ -160,8 +160,8 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         material.replace_extension(".mtl");
         if (auto ok = write_file(material, write_obj_material(options.texture)); !ok) return ok;
     }
-    const auto text = write_obj(*written, options.texture.empty() ? std::string() : material.filename().string(),
-                                origin);
+    const auto text =
+        write_obj(*written, options.texture.empty() ? std::string() : material.filename().string(), origin);
     if (!text) return fail_at(path, text.error());
     return write_file(path, *text);
 }

@@ -21,8 +21,8 @@ struct MeshFileOptions {
     double millimetres_per_unit = 1;  // for the file's coordinates: 1000 for a file in metres; finite, above 0
     MeshReadOptions reading;          // of a file that is read
     std::string timestamp;            // for the comment of a PLY file that is written (ply.h); empty: none
-    std::string texture;  // of a PLY or OBJ file that is written, the name of its image; an OBJ's material then
-                          // goes to a file of the same name that ends in .mtl
+    std::string texture;         // of a PLY or OBJ file that is written, the name of its image; an OBJ's material then
+                                 // goes to a file of the same name that ends in .mtl
     GlobalShift global_shift{};  // of a file that is written, mm: added to the positions, as doubles
     std::span<const std::uint8_t> image;  // of a .glb that is written, the file of its image: PNG or JPEG
 };
@@ -79,9 +79,9 @@ Result<LengthUnit> length_unit(std::string_view symbol);
 // Of the vertices that triangles use; of all where there are no triangles. Scanners leave unused ones at the origin.
 std::optional<SpaceBounds> surface_bounds(const Mesh& mesh);
 
-// The unit that a mesh of a person is probably in, by the diagonal of its surface's bounding box: metres below 10, centimetres
-// below 600, otherwise millimetres. A person's diagonal is 0.5 m (an infant) to 3 m (arms and legs spread), so the
-// bounds are safe except for scenes above 6 m in cm. For a mesh without extent: mm.
+// The unit that a mesh of a person is probably in, by the diagonal of its surface's bounding box: metres below 10,
+// centimetres below 600, otherwise millimetres. A person's diagonal is 0.5 m (an infant) to 3 m (arms and legs spread),
+// so the bounds are safe except for scenes above 6 m in cm. For a mesh without extent: mm.
 LengthUnit guess_unit(const Mesh& mesh);
 
 // The unit that the file's format prescribes, whatever the mesh looks like: metres for glTF; nothing for the others.

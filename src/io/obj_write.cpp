@@ -32,9 +32,9 @@ Result<std::string> write_obj(const Mesh& mesh, std::string_view material_file, 
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
         if (is_shifted) {
             const auto& p = mesh.positions[v];
-            append_statement<double, 3>(text, "v", {static_cast<double>(p[0]) + origin[0],
-                                                    static_cast<double>(p[1]) + origin[1],
-                                                    static_cast<double>(p[2]) + origin[2]});
+            append_statement<double, 3>(text, "v",
+                                        {static_cast<double>(p[0]) + origin[0], static_cast<double>(p[1]) + origin[1],
+                                         static_cast<double>(p[2]) + origin[2]});
         } else {
             append_statement(text, "v", mesh.positions[v]);
         }

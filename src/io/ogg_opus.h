@@ -16,7 +16,7 @@ struct OpusTrack {
     std::uint32_t pre_skip = 0;                      // samples at the beginning that are decoded but not heard
     std::uint64_t samples = 0;                       // to be heard after those, at 48 kHz
     std::vector<std::vector<std::uint8_t>> packets;  // each well formed
-    bool is_silent = false;  // every sample of the file that it was coded from is zero
+    bool is_silent = false;                          // every sample of the file that it was coded from is zero
 };
 
 // bad_input if it is no such file, is damaged, or has more than two channels: the message says how to make one.

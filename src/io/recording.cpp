@@ -166,4 +166,30 @@ Result<Mesh> read_frame(const Recording& recording, std::size_t frame, const Mes
     return mesh;
 }
 
+Result<SequenceFiles> find_frames(std::span<const std::string> names, const SequenceOptions& options) {
+    if (names.size() != 1) return find_sequence(names, options);
+    auto found = find_recording(names[0]);
+    if (!found) return tl::unexpected(found.error());
+    if (!*found) return find_sequence(names, options);
+    SequenceFiles out;
+    out.paths = (*found)->meshes;
+    for (std::size_t k = 0; (*found)->vologram && k < frame_count(**found); ++k)
+        out.paths.emplace_back(names[0] + " frame " + std::to_string(k));
+    if (out.paths.empty()) return fail(ErrorKind::bad_input, names[0] + ": the recording has no frames");
+    out.remarks = (*found)->remarks;
+    out.recording = std::make_shared<const Recording>(std::move(**found));
+    return out;
+}
+
+Result<Mesh> read_mesh_of(const SequenceFiles& frames, std::size_t place, const MeshFileOptions& options,
+                          MeshFindings* findings) {
+    if (frames.recording) return read_frame(*frames.recording, place, options, findings);
+    return read_mesh(frames.paths[place], options, findings);
+}
+
+std::optional<LengthUnit> unit_of_frames(const SequenceFiles& frames, std::size_t place) {
+    if (frames.recording && frames.recording->unit) return frames.recording->unit;
+    return unit_of_format(frames.paths[place]);
+}
+
 }  // namespace htvm

@@ -16,12 +16,14 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "htvm/result.hpp"
 #include "io/mesh_file.h"
 #include "io/mesh_reading.h"
+#include "io/sequence.h"
 #include "io/timestamps.h"
 #include "io/vologram.h"
 
@@ -46,6 +48,17 @@ struct Recording {
 // bad_input if it is damaged or its files are not there, unsupported if it is of a kind that is not read, with what to
 // do instead. All names of files are looked for in the manifest's folder and those in it, nowhere else.
 Result<std::optional<Recording>> find_recording(const std::filesystem::path& path);
+
+// The frames that names refer to: of a recording, if one of these is named, else files (sequence.h). The paths of a
+// recording that is one file are that file's, each with its frame's number, for messages.
+Result<SequenceFiles> find_frames(std::span<const std::string> names, const SequenceOptions& options = {});
+
+// The mesh of the frame at that place of the list, from the recording or its own file, as read_mesh does it.
+Result<Mesh> read_mesh_of(const SequenceFiles& frames, std::size_t place, const MeshFileOptions& options = {},
+                          MeshFindings* findings = nullptr);
+
+// The unit that the frames' format prescribes; nothing if none does.
+std::optional<LengthUnit> unit_of_frames(const SequenceFiles& frames, std::size_t place);
 
 std::size_t frame_count(const Recording& recording);
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,10 +16,13 @@
 
 namespace htvm {
 
+struct Recording;  // io/recording.h
+
 struct SequenceFiles {
     std::vector<std::filesystem::path> paths;  // one per frame, in order; never empty
     std::vector<std::uint64_t> numbers;        // of the frames, by the names, ascending; empty if the names have none
     std::vector<MeshRemark> remarks = {};      // what was left out or guessed, clauses behind the sequence's name
+    std::shared_ptr<const Recording> recording = nullptr;  // that the frames are of; null: they are files by themselves
 };
 
 struct SequenceOptions {

@@ -8,6 +8,7 @@
 
 #include "core/srgb.h"
 #include "io/image_file.h"
+#include "io/recording.h"
 #include "io/texture_materials.h"
 #include "io/texture_parts.h"
 
@@ -131,11 +132,27 @@ void turn_over(Mesh& mesh) {
 
 }  // namespace
 
+// The pictures that come with a recording.
+Result<TextureFiles> TextureFiles::of_recording(TextureFiles files) {
+    const auto& recording = *files.meshes_.recording;
+    if (!recording.unread_texture.empty())
+        return fail(ErrorKind::unsupported,
+                    recording.format + ": " + recording.unread_texture + std::string(other_ways));
+    files.images_ = recording.images;
+    if (!recording.video) return files;
+    auto video = TextureVideo::open(*recording.video, files.options_.ffmpeg);
+    if (!video) return fail(video.error().kind, recording.format + ": " + video.error().message);
+    files.video_ = std::move(*video);
+    files.times_ = places_in_time(files.meshes_);
+    return files;
+}
+
 Result<TextureFiles> TextureFiles::open(const TextureOptions& options, const SequenceFiles& meshes) {
     TextureFiles out;
     out.options_ = options;
     out.meshes_ = meshes;
     const auto& what = options.files;
+    if (what.empty() && meshes.recording) return of_recording(std::move(out));
     if (what.empty() || what == "none") return out;
     std::error_code error;
     if (fs::is_directory(what, error) || (!fs::exists(what, error) && what.find_first_of("*?") != what.npos))
@@ -461,7 +478,7 @@ Result<TextureFiles::ReadImage> TextureFiles::picture_of_video(std::size_t numbe
 Result<TexturedMesh> TextureFiles::read(std::size_t place, TextureUse use, const MeshFileOptions& options) {
     const auto& path = meshes_.paths[place];
     findings_ = {};
-    auto mesh = read_mesh(path, options, &findings_);
+    auto mesh = read_mesh_of(meshes_, place, options, &findings_);
     if (!mesh) return tl::unexpected(mesh.error());
     return completed(std::move(*mesh), path, place, use);
 }

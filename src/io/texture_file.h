@@ -79,6 +79,7 @@ public:
     std::vector<std::filesystem::path> known_images() const;
 
 private:
+    static Result<TextureFiles> of_recording(TextureFiles files);
     struct Found {
         std::string name;
         std::filesystem::path path;  // empty: the bytes are inside of the mesh's file

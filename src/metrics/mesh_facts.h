@@ -16,14 +16,15 @@ struct MeshFacts {
     std::size_t pieces = 0;               // sets of triangles that hang together by their corners
     // Pieces of less than a hundredth of the largest one's area: dust of the reconstruction.
     std::size_t specks = 0;
-    // Pieces that lie farther from the largest one's box than a tenth of its diagonal: spikes' ends, walls, other things.
+    // Pieces that lie farther from the largest one's box than a tenth of its diagonal: spikes' ends, walls, other
+    // things.
     std::size_t strays = 0;
-    double border = 0;                  // length of edges that only one triangle has
-    std::size_t forked_edges = 0;       // that three triangles or more have
-    double area = 0, mean_edge = 0;     // of all triangles
+    double border = 0;                    // length of edges that only one triangle has
+    std::size_t forked_edges = 0;         // that three triangles or more have
+    double area = 0, mean_edge = 0;       // of all triangles
     std::array<double, 3> low{}, high{};  // the largest piece's box
     std::array<double, 3> middle{};       // of its surface
-    double light = -1;                  // mean of the surface's colours, 0..255; -1: none
+    double light = -1;                    // mean of the surface's colours, 0..255; -1: none
 };
 
 MeshFacts facts_of(const Mesh& mesh);

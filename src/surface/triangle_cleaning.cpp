@@ -26,7 +26,8 @@ std::vector<Triangle> at_places(std::span<const LatticePoint> positions, std::sp
     known.reserve(positions.size());
     std::vector<std::uint32_t> place;
     place.reserve(positions.size());
-    for (const auto& p : positions) place.push_back(known.emplace(p, static_cast<std::uint32_t>(place.size())).first->second);
+    for (const auto& p : positions)
+        place.push_back(known.emplace(p, static_cast<std::uint32_t>(place.size())).first->second);
     std::vector<Triangle> out;
     out.reserve(triangles.size());
     for (const auto& t : triangles) out.push_back({place[t[0]], place[t[1]], place[t[2]]});
@@ -122,8 +123,7 @@ bool faces_wrongly(const Piece& piece, std::span<const LatticePoint> positions, 
     double outwards = 0;
     for (const auto t : piece.triangles) {
         const auto& p = positions[triangles[t][0]];
-        const double volume =
-            dot(area_of(positions, triangles[t]), Vector3d{1.0 * p.x, 1.0 * p.y, 1.0 * p.z} - middle);
+        const double volume = dot(area_of(positions, triangles[t]), Vector3d{1.0 * p.x, 1.0 * p.y, 1.0 * p.z} - middle);
         outwards += turned[t] ? -volume : volume;
     }
     return outwards < 0;

@@ -1,5 +1,6 @@
 // Triangles that follow the surface: each once, all wound alike. Exporters write every triangle once for each side,
-// merged sensors and greedy triangulations wind them as they come; whatever asks which way a surface faces is lost there.
+// merged sensors and greedy triangulations wind them as they come; whatever asks which way a surface faces is lost
+// there.
 #pragma once
 
 #include <cstddef>

@@ -12,7 +12,8 @@ using testing::HasSubstr;
 Mesh person(float size = 1, float x = 0, bool coloured = true) {
     Mesh out;
     for (int i = 0; i < 60; ++i)
-        out.positions.push_back({x + size * 200 * static_cast<float>(i % 3), size * 30 * static_cast<float>(i), size * 10});
+        out.positions.push_back(
+            {x + size * 200 * static_cast<float>(i % 3), size * 30 * static_cast<float>(i), size * 10});
     for (std::uint32_t i = 2; i < 60; ++i) out.triangles.push_back({i - 2, i - 1, i});
     if (coloured) out.colours.assign(60, {90, 80, 70});
     return out;

@@ -167,7 +167,8 @@ TEST(Encoder, OfATrackedSurfaceTakesDoubledAndMixedTrianglesForTheSurfaceThatThe
     const auto turn = [](Triangle t) { return Triangle{t[0], t[2], t[1]}; };
     const auto clean = stream_of([](Mesh&) {});
     EXPECT_EQ(stream_of([&](Mesh& mesh) {
-                  for (std::size_t t = 0; t < mesh.triangles.size(); t += 3) mesh.triangles[t] = turn(mesh.triangles[t]);
+                  for (std::size_t t = 0; t < mesh.triangles.size(); t += 3)
+                      mesh.triangles[t] = turn(mesh.triangles[t]);
               }).size(),
               clean.size());
     const auto doubled = stream_of([&](Mesh& mesh) {
