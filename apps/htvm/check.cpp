@@ -252,7 +252,7 @@ void advise(const Report& report, Judgement& j) {
             fmt::format("the surface's area changes by {:.1f} % from frame to frame: parts come and go, which costs I- "
                         "and patched frames; steadier masks and depth help",
                         100 * j.area_flicker));
-    if (j.light_flicker > 0.02)
+    if (j.light_flicker > 0.05)
         say(
             fmt::format("brightness changes by {:.1f} % from frame to frame: fix the cameras' exposure and white "
                         "balance",

@@ -123,14 +123,16 @@ tl::unexpected<Error> ended_early(Pass& pass, StreamOutput& output, const Error&
         return tl::unexpected(error);
     }
     if (pass.summary.totals.all().frames == 0 || !pass.plan.keep_partial) return tl::unexpected(error);
-    const bool whole = finish(pass).has_value();
+    (void)finish(pass);  // of the two errors, the first says why
     const auto frames = pass.summary.totals.all().frames;
     const auto kept = output.keep();
     std::string message = fmt::format("{}; {} encoded before", error.message,
                                       counted(frames, "frame") + (frames == 1 ? " was" : " were"));
-    if (!kept.empty())
-        message += fmt::format(", now in {}, which {}: rename it to use it", kept,
-                               whole ? "is a whole stream" : "plays up to where it ends");
+    if (!kept.name.empty() && kept.frames >= frames)
+        message += fmt::format(", now in {}, which is a whole stream: rename it to use it", kept.name);
+    else if (!kept.name.empty())
+        message += fmt::format(", the first {} of them now in {}, which is a whole stream: rename it to use it",
+                               kept.frames, kept.name);
     std::error_code ignored;
     if (std::filesystem::is_regular_file(pass.plan.output.place, ignored))
         message += fmt::format(". {} is as it was", pass.plan.output.place);

@@ -188,9 +188,15 @@ Result<void> StreamOutput::write_one(const Packet& packet) {
         bytes_ += packet_overhead + packet.payload.size();
         return publishing_->send(packet);
     }
+    // Behind a part of a packet nothing has its place.
+    if (failed_) return tl::unexpected(*failed_);
     const auto bytes = write_packet(packet);
-    if (auto written = file_ ? file_->write(bytes) : write_standard_output(bytes); !written) return written;
+    if (auto written = file_ ? file_->write(bytes) : write_standard_output(bytes); !written) {
+        failed_ = written.error();
+        return written;
+    }
     bytes_ += bytes.size();
+    if (file_) written_.push_back({bytes_, frame_type(packet.kind).has_value()});
     return {};
 }
 
@@ -219,7 +225,25 @@ Result<void> StreamOutput::finish() {
     return {};
 }
 
-std::string StreamOutput::keep() { return file_ ? file_->keep().string() : std::string(); }
+StreamOutput::Kept StreamOutput::keep() {
+    if (!file_) return {};
+    const auto path = file_->keep();
+    if (path.empty()) return {};
+    std::error_code error;
+    const auto size = std::filesystem::file_size(path, error);
+    const auto is_whole = [size](const Written& packet) { return packet.end <= size; };
+    const auto beyond = std::find_if_not(written_.begin(), written_.end(), is_whole);
+    Kept out{path.string(), static_cast<std::size_t>(std::count_if(
+                                written_.begin(), beyond, [](const Written& packet) { return packet.is_frame; }))};
+    if (error) return out;
+    if (out.frames == 0) {
+        std::filesystem::remove(path, error);
+        return {};
+    }
+    const auto end = std::prev(beyond)->end;
+    if (end < size) std::filesystem::resize_file(path, end, error);
+    return out;
+}
 
 // ---- What the commands accept of a stream ---------------------------------------------------------------------------
 

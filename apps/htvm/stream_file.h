@@ -82,8 +82,13 @@ public:
     // Once it is finished: whether it begins with an index.
     bool has_index() const { return has_index_; }
     bool has_bounds() const { return indexer_.bounds().has_value(); }
-    // Where a stream that ends early is left, beside its place; empty where it went to a pipe.
-    std::string keep();
+    // A stream that ends early: what is left of it beside its place, cut where its last whole packet ends, as a full disk
+    // may have taken a part of one. Without a name where it went to a pipe, or no frame is whole.
+    struct Kept {
+        std::string name;
+        std::size_t frames = 0;
+    };
+    Kept keep();
     std::uint64_t bytes() const { return bytes_; }
 
 private:
@@ -97,6 +102,12 @@ private:
     std::optional<AudioTrack> audio_;
     StreamIndexer indexer_;
     std::uint64_t bytes_ = 0;
+    struct Written {
+        std::uint64_t end = 0;
+        bool is_frame = false;
+    };
+    std::vector<Written> written_;  // packets of a file, in order
+    std::optional<Error> failed_;   // of the first write that did
     bool has_index_ = false;
 };
 

@@ -39,7 +39,7 @@ expect 0 "mesh 2 of standard input: it has no colours" bash -c "cat fading/*.ply
 
 # The second half is in another unit.
 change mixed 'v = [[c / 1000 for c in row[:3]] + row[3:] for row in v] if k > 2 else v'
-expect 1 "frame_00003.ply: times smaller than the first frame: of another capture, or in another unit" \
+expect 1 "times smaller than the first frame: of another capture, or in another unit" \
     "$htvm" encode mixed -o x.htvm
 
 # Far from the origin, as surveys are: what decode writes is where the capture is, to the lattice's step.
@@ -79,6 +79,11 @@ done
 # A rate that the capture does not fit into.
 expect 5 "above its --bitrate: give at least that, or fewer vertices" \
     "$htvm" encode capture --profile topology --bitrate 0.1 -o x.htvm
+
+# What a full disk leaves is a whole stream, of the frames that fit.
+(trap '' XFSZ; ulimit -f 4; "$htvm" encode capture --keyint 1 -q 60 -o full.htvm 2>said)
+grep -q "full.htvm.partial, which is a whole stream" said || fail "a full disk: $(cat said)"
+expect 0 "all sound" "$htvm" verify full.htvm.partial
 
 # The report.
 expect 0 "nothing to mend was found" "$htvm" check capture
