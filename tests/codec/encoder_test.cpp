@@ -9,6 +9,7 @@
 #include "codec/enhanced_options.h"
 #include "codec/format/sequence.h"
 #include "codec/test_sequences.h"
+#include "htvm/decoder.hpp"
 
 namespace htvm::internal {
 namespace {
@@ -127,9 +128,10 @@ std::vector<bool> frames_with_normals(EncoderOptions options) {
     auto encoder = Encoder::create(std::move(options));
     Decoder decoder;
     std::vector<bool> out;
-    for (const auto& frame : synthetic(false, 3, 300).frames) {
-        EXPECT_FALSE(frame.mesh.normals.empty());
-        EXPECT_TRUE(encoder->push(frame.mesh));
+    const auto sequence = synthetic(false, 3, 300);
+    for (std::size_t t = 0; t < 3; ++t) {
+        EXPECT_FALSE(sequence.frames[t].mesh.normals.empty());
+        EXPECT_TRUE(encoder->push(sequence.frames[t].mesh, nullptr, static_cast<std::int64_t>(t) * 33333));
     }
     EXPECT_TRUE(encoder->finish());
     while (const auto packet = encoder->pull())
@@ -157,9 +159,10 @@ TEST(Encoder, OfATrackedSurfaceTakesDoubledAndMixedTrianglesForTheSurfaceThatThe
         EncoderOptions options;
         options.threads = 1;
         auto encoder = Encoder::create(options);
-        for (auto frame : sequence.frames) {
-            change(frame.mesh);
-            EXPECT_TRUE(encoder->push(frame.mesh));
+        for (std::size_t t = 0; t < 3; ++t) {
+            auto mesh = sequence.frames[t].mesh;
+            change(mesh);
+            EXPECT_TRUE(encoder->push(mesh, nullptr, static_cast<std::int64_t>(t) * 33333));
         }
         EXPECT_TRUE(encoder->finish());
         return drained(*encoder);
