@@ -7,7 +7,7 @@ htvm=$(realpath "$1")
 out=$(realpath -m "${2:-$(dirname "$0")/seeds}")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-mkdir -p "$out"/{decode_file,decode_stream,c_decoder,import_{ply,obj,mtl,drc,gltf,image,bvh,json,azure}}
+mkdir -p "$out"/{decode_file,decode_stream,c_decoder,frame_names,import_{ply,obj,mtl,drc,gltf,image,bvh,json,azure,times}}
 
 "$htvm" synth "$work/capture" --first-frame 30 --frames 5 --vertices 150 >/dev/null 2>&1
 "$htvm" synth "$work/normals" --first-frame 60 --frames 3 --vertices 150 --normals >/dev/null 2>&1
@@ -321,3 +321,69 @@ newmtl b\
 map_Kd C:\work\t.jpg
 MTL
 du -sh "$out"
+
+cat >"$out/import_times/csv" <<'TEXT'
+# camera 3
+Frame;Time [s];note
+7;0,5;"a; b"
+9;0,75;c
+TEXT
+cat >"$out/import_times/timecode" <<'TEXT'
+00:00:00;00
+00:00:01;02
+00:01:00;02
+TEXT
+cat >"$out/import_times/dates" <<'TEXT'
+timestamp
+2024-01-31T12:05:01.123Z
+2024-01-31 12:05:01,200+00:00
+20240131T120502.5Z
+TEXT
+cat >"$out/import_times/json" <<'TEXT'
+{"frames": [{"frame": 7, "timestamp_us": 0}, {"frame": 9, "Timestamp_ns": "500000000"}]}
+TEXT
+cat >"$out/frame_names/levels" <<'TEXT'
+f1_lod0
+f2_lod0
+f1_lod1
+f2_lod1
+template
+TEXT
+cat >"$out/frame_names/times" <<'TEXT'
+20240131_120459_970
+20240131_120500_003
+f_1699999999.5
+f_1699999999.125
+TEXT
+cat >"$out/frame_names/signs" <<'TEXT'
+f-2
+f-1
+f0
+f1 (1)
+f1 - Copy
+~f1.tmp
+0001_4096
+0002_4001
+0003_4444
+TEXT
+cat >"$out/import_bvh/as_written" <<'BVH'
+# exported
+hierarchy
+ROOT mixamorig:Hips 1
+{
+  OFFSET 0,0 90,5 0,0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT Spine { OFFSET 0 20 0 CHANNELS 3 Yrotation Xrotation Zrotation
+    End Site { }
+  }
+}
+MOTION
+Frames:4
+Frame Time:0
+0,0 90,5 0 0 0 0 0 0 0
+0,0 nan 0 0 0 0 0 0 0
+0,0 90,5 0 0 1e
+BVH
+cat >"$out/import_azure/odd" <<'JSON'
+{"Frames": [{"timestampUsec": 5, "Bodies": [{"bodyId": 1, "JointPositions": [[NaN, 1, 2], {"X": 1, "y": 2, "Z": -Infinity}, [1, 2, 3]]}]}, null, {"timestamp_usec": 5, "bodies": [{"body_id": 2, "joint_positions": [[0, 1, 2], [1, 2, 3], [4, 5, 6]]}]}]}
+JSON

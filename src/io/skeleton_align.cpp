@@ -316,7 +316,8 @@ Result<AlignedPoses> align(const SkeletonTrack& track, const MeshClock& mesh, co
     const auto filled = fill_joints(track, times, options, aligned.poses);
     if (!filled) return tl::unexpected(filled.error());
     say_filled(*filled, aligned.notes);
-    if (times.back() < track.timestamps.back() - 1 / track.fps)
+    const double interval = 1 / (mesh.fps > 0 ? std::min(mesh.fps, track.fps) : track.fps);
+    if (times.back() < track.timestamps.back() - interval - same_time)
         aligned.notes.push_back("The skeleton goes on for " + number(track.timestamps.back() - times.back()) +
                                 " s after the last mesh frame: not used.");
 

@@ -296,8 +296,12 @@ void read_clock(const json& frames, SkeletonTrack& track) {
     const auto count = static_cast<std::size_t>(std::count(known.begin(), known.end(), true));
     if (count == 0 || (count == 1 && frames.size() > 1)) return number_frames(frames, track);
     std::vector<double> intervals;
-    for (std::size_t t = 1; t < stamps.size(); ++t)
-        if (known[t] && known[t - 1]) intervals.push_back((*stamps[t] - *stamps[t - 1]) / 1e6);
+    std::optional<std::size_t> last;
+    for (std::size_t t = 0; t < stamps.size(); ++t) {
+        if (!known[t]) continue;
+        if (last) intervals.push_back((*stamps[t] - *stamps[*last]) / 1e6 / static_cast<double>(t - *last));
+        last = t;
+    }
     const double interval = intervals.empty() ? 1 / track.fps : median_of(intervals);
     track.timestamps = seconds_of(stamps, known, interval);
     for (std::size_t t = 1; t < track.timestamps.size(); ++t)

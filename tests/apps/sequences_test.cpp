@@ -19,7 +19,7 @@ Pairs pairs_of(const Numbers& original, const Numbers& decoded) {
     return out;
 }
 
-TEST(FramePairs, TheNumberIsTheLastInTheName) {
+TEST(FramePairs, TheNumberIsTheOneThatVaries) {
     EXPECT_EQ(numbers_of({"a/take2_frame_0007.ply", "a/take2_frame_0012.ply"}), (Numbers{7, 12}));
     EXPECT_EQ(numbers_of({"00000.ply", "00003.ply"}), (Numbers{0, 3}));
     EXPECT_EQ(numbers_of({"f9_low.obj", "f10_low.obj"}), (Numbers{9, 10}));
