@@ -311,6 +311,44 @@ BASE64
 image png_sixteen_bits <<'BASE64'
 iVBORw0KGgoAAAANSUhEUgAAAAQAAAACEAAAAAAKU/78AAAAEklEQVR4nGNggANGJmYWVjZ2AABmAB1f0mDxAAAAAElFTkSuQmCC
 BASE64
+# Images of a header and pixels, in their kinds.
+python3 - "$out/import_image" <<'PYTHON'
+import struct
+import sys
+
+
+def bmp(name, width, height, bits, coding, tables, pixels):
+    header = struct.pack("<IiiHHI5I", 40, width, height, 1, bits, coding, 0, 0, 0, 0, 0)
+    start = struct.pack("<2sIII", b"BM", 0, 0, 14 + len(header) + len(tables))
+    open(sys.argv[1] + "/bmp_" + name, "wb").write(start + header + tables + pixels)
+
+
+def tga(name, kind, width, height, bits, corner, palette, pixels):
+    header = struct.pack("<BBBHHBHHHHBB", 0, bool(palette), kind, 0, len(palette) // 3, 24 * bool(palette), 0, 0, width, height, bits, corner)
+    open(sys.argv[1] + "/tga_" + name, "wb").write(header + palette + pixels + bytes(8) + b"TRUEVISION-XFILE.\0")
+
+
+def dds(name, width, height, flags, kind, bits, masks, pixels):
+    header = struct.pack("<4sIIII56xII4sI4I20x", b"DDS ", 124, 0x1007, height, width, 32, flags, kind, bits, *masks)
+    open(sys.argv[1] + "/dds_" + name, "wb").write(header + pixels)
+
+
+some = bytes(range(1, 97))
+bmp("plain", 3, 4, 24, 0, b"", some[:48])
+bmp("from_top", 2, -2, 32, 0, b"", some[:16])
+bmp("masks", 4, 2, 16, 3, struct.pack("<3I", 0xF800, 0x7E0, 0x1F), some[:16])
+bmp("bits", 9, 2, 1, 0, some[:8], some[:8])
+bmp("runs_of_8", 3, 2, 8, 1, some + some, b"\3\1\0\0\0\3\0\1\0\0\0\2\1\1\0\1")
+bmp("runs_of_4", 3, 2, 4, 2, some[:64], b"\3\x11\0\0\0\3\1\0\0\1")
+tga("plain", 2, 3, 4, 24, 0x20, b"", some[:36])
+tga("palette", 1, 3, 4, 8, 0x00, some[:48], bytes(range(12)))
+tga("runs", 10, 4, 4, 16, 0x30, b"", b"\x8f\1\2")
+tga("grey_runs", 11, 3, 2, 8, 0x20, b"", b"\x82\7\2\1\2\3")
+dds("bc1", 5, 4, 4, b"DXT1", 0, [0] * 4, some[:16])
+dds("bc3", 4, 4, 4, b"DXT5", 0, [0] * 4, some[:16])
+dds("of_10", 4, 4, 4, b"DX10", 0, [0] * 4, struct.pack("<5I", 71, 3, 0, 1, 0) + some[:8])
+dds("plain", 3, 2, 0x40, b"", 24, [0xFF0000, 0xFF00, 0xFF, 0], some[:18])
+PYTHON
 cat >"$out/import_mtl/materials" <<'MTL'
 # materials
 newmtl skin of a
@@ -319,7 +357,12 @@ map_Kd -s 1 1 -blendu on my skin.png
 newmtl b\
  c
 map_Kd C:\work\t.jpg
+newmtl none #3
+	Kd 0.5 1 0
+map_Ke -o 0.5 glow.png
 MTL
+printf '\xef\xbb\xbfnewmtl m\rMAP_KA "a b.png"\rKd 1\r' >"$out/import_mtl/returns"
+printf 'my skin.mtl "b c.mtl" d.MTL e' >"$out/import_mtl/names"
 du -sh "$out"
 
 cat >"$out/import_times/csv" <<'TEXT'

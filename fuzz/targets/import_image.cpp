@@ -1,12 +1,15 @@
-// PNG, JPEG and WebP images: must give all pixels of an image within the limit, or an error. Written and read again, a
-// PNG is the same.
+// PNG, JPEG, WebP, BMP, TGA and DDS images: must give all pixels of an image within the limit, or an error. Written and
+// read again, a PNG is the same.
+#include <string>
+
 #include "fuzz_input.h"
 #include "io/image_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
     constexpr int largest_side = 256;  // small ones decode fast
-    const auto image = read_image({data, size}, largest_side);
+    std::string damage;
+    const auto image = read_image({data, size}, largest_side, &damage);
     if (!image) return 0;
     fuzz::require(
         image->width > 0 && image->height > 0 && image->width <= largest_side && image->height <= largest_side,
