@@ -8,9 +8,11 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "command_line/capture_kind.h"
+#include "command_line/terminal.h"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "htvm/picture_decoder.hpp"
@@ -173,7 +175,7 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
     if (auto found = find_times(source, *files, options.timestamps); !found) return tl::unexpected(found.error());
     auto textures = TextureFiles::open(options.texture, *files);
     if (!textures) return tl::unexpected(textures.error());
-    source.mesh_at = [meshes = *files, textures = std::move(*textures)](
+    source.mesh_at = [meshes = *files, told = std::set<std::string>(), textures = std::move(*textures)](
                          MeshSource& self, std::size_t position) mutable -> Result<TexturedMesh> {
         if (self.guesses_unit || self.finds_shift) {
             const auto mesh = read_mesh_of(meshes, position);
@@ -189,6 +191,9 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
             file_options.reading.origin[c] = static_cast<double>(self.global_shift[c]) / self.millimetres_per_unit;
         auto textured = textures.read(position, TextureUse::where_colourless, file_options);
         if (!textured) return textured;
+        for (const auto& [about, text, is_loss] : textures.findings().remarks)
+            if (is_loss && told.insert(about).second)
+                warn(fmt::format("{}: {}", meshes.paths[position].string(), text));
         auto& [mesh, texture, file] = *textured;
         if (texture) mesh.colours = colours_from_texture(mesh, *texture);
         return textured;

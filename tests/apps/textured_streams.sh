@@ -108,7 +108,7 @@ expect 0 "all sound" "$htvm" verify coordinates.htvm
 
 # What has no effect is said.
 expect 0 "there are no pictures of a texture, so --images does nothing" "$htvm" decode coordinates.htvm --images jpeg -o none
-expect 0 "the texture coordinates are encoded, without an image" "$htvm" encode walk --texture none -o none.htvm
+expect 0 "the texture coordinates are left out with their image; --texture-as coordinates keeps them" "$htvm" encode walk --texture none -o none.htvm
 
 # A damaged picture costs no frame.
 python3 - av1.htvm damaged.htvm <<'PYTHON'

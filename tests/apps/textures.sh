@@ -58,7 +58,7 @@ small=(--width 60 --height 40 --elevation 0 --up y --quiet)
 "$htvm" still square.obj --texture none -o square.png "${small[@]}" --shading unlit && shows square.png "200 200 200,200 200 200"
 
 # What is wrong, and where.
-head -c 60 skin.png >cut.png
+head -c 45 skin.png >cut.png
 expect 1 "cut.png: the PNG image is damaged or cut off" "$htvm" still square.obj --texture cut.png -o x.png
 expect 1 "--texture: there is no file or folder gone.png" "$htvm" still square.obj --texture gone.png -o x.png
 expect 1 "square.obj: this is no PNG, JPEG or WebP image; save it as one of them, or, where it has a picture for each mesh, as a video: .mp4 .m4v .mov .mkv .webm .avi .mpg .y4m" \

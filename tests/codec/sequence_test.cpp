@@ -177,6 +177,7 @@ TEST(SequenceHeader, MetadataIsBoundedTextInUtf8) {
 std::vector<std::uint8_t> header_of_version_1(bool with_spacing) {
     auto header = full_header();
     header.floor.reset();
+    header.global_shift = {};
     header.metadata.clear();
     auto bytes = write_sequence_header(header);
     bytes[4] = 1;

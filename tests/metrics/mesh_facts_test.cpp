@@ -38,8 +38,8 @@ TEST(MeshFacts, SeamsAreNoBorders) {
 
 TEST(MeshFacts, SpecksAreSmallAndStraysAreFar) {
     Mesh mesh;
-    add_square(mesh, 0);
-    add_square(mesh, 110, 5);
+    add_square(mesh, 0, 200);
+    add_square(mesh, 210, 5);
     add_square(mesh, 900);
     const auto facts = facts_of(mesh);
     EXPECT_EQ(facts.pieces, 3u);
