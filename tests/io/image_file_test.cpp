@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <tuple>
 
 #include <algorithm>
 #include <cstdlib>
@@ -75,16 +76,18 @@ Image noise(int width, int height) {
 
 TEST(ImageFile, OnesCutOffLateAreReadAndSaySo) {
     const Image image = noise(64, 64);
-    for (const auto& bytes : {*write_png_image(image), *write_jpeg_image(image)}) {
+    // In tenths of its bytes: so that rows of a PNG, or of a JPEG's blocks, are missing whole.
+    for (const auto& [bytes, late, early] :
+         {std::tuple{*write_png_image(image), 8u, 4u}, {*write_jpeg_image(image), 6u, 2u}}) {
         std::string damage;
         const auto whole = read_image(bytes, 64, &damage);
         ASSERT_TRUE(whole.has_value());
         EXPECT_EQ(damage, "");
-        const auto read = read_image(std::span(bytes).first(bytes.size() * 8 / 10), 64, &damage);
+        const auto read = read_image(std::span(bytes).first(bytes.size() * late / 10), 64, &damage);
         ASSERT_TRUE(read.has_value()) << read.error().message;
         EXPECT_TRUE(std::equal(read->rgb.begin(), read->rgb.begin() + 3 * 64 * 28, whole->rgb.begin()));
-        EXPECT_THAT(damage, testing::MatchesRegex("is cut off: the last [123][0-9] % of it are grey or black"));
-        EXPECT_FALSE(read_image(std::span(bytes).first(bytes.size() * 4 / 10), 64, &damage).has_value());
+        EXPECT_THAT(damage, testing::MatchesRegex("is cut off: the last [1-4][0-9] % of it are grey or black"));
+        EXPECT_FALSE(read_image(std::span(bytes).first(bytes.size() * early / 10), 64, &damage).has_value());
     }
 }
 

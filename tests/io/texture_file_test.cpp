@@ -429,7 +429,7 @@ TEST_F(TextureFile, DamagedImagesAreToldOnceForEachMesh) {
     for (std::size_t i = 0; i < noise.rgb.size(); ++i)
         noise.rgb[i] = static_cast<std::uint8_t>(i * i * 2654435761u >> 13);
     auto jpeg = *write_jpeg_image(noise);
-    jpeg.resize(jpeg.size() * 8 / 10);
+    jpeg.resize(jpeg.size() * 6 / 10);
     write_bytes(folder / "a.jpg", jpeg);
     mesh("a.obj", obj);
     auto textures = TextureFiles::open({}, *find_sequence((folder / "a.obj").string()));
