@@ -407,13 +407,14 @@ std::vector<Entry> entries_of(const std::vector<fs::path>& paths) {
 
 // The order of files by name, whose order says something too.
 SequenceFiles order_of_named(const std::vector<fs::path>& paths) {
-    const auto entries = entries_of(paths);
+    std::vector<MeshRemark> remarks;
+    auto entries = entries_of(paths);
+    leave_out_copies(entries, remarks);
     const auto stems = stems_of(entries);
     const auto kinds = kinds_of_names(stems, entries[0].ending);
-    std::vector<MeshRemark> remarks;
     const auto given = [&] {
         FrameOrder out;
-        for (std::size_t place = 0; place < paths.size(); ++place) out.places.push_back(place);
+        for (std::size_t place = 0; place < entries.size(); ++place) out.places.push_back(place);
         return out;
     }();
     auto order = natural_order(entries);
@@ -424,7 +425,7 @@ SequenceFiles order_of_named(const std::vector<fs::path>& paths) {
         by_number = numbered.has_value();
         if (by_number) order = std::move(*numbered);
         if (!numbered) remarks.push_back({"numbers", numbered.error().message, true});
-    } else if (kinds[0].varying_numbers > 0 && 2 * kinds[0].places.size() > paths.size() && paths.size() > 3) {
+    } else if (kinds[0].varying_numbers > 0 && 2 * kinds[0].places.size() > entries.size() && entries.size() > 3) {
         remarks.push_back({"strangers",
                            entries[kinds[1].places[0]].name() + " is not named as most are (\"" + kinds[0].pattern +
                                "\"), and is a frame all the same",
@@ -432,12 +433,12 @@ SequenceFiles order_of_named(const std::vector<fs::path>& paths) {
     }
     if (order.places == given.places) return in_order(entries, std::move(order), std::move(remarks));
     std::size_t first = 0;  // of two that are out of order
-    std::vector<std::size_t> rank(paths.size());
+    std::vector<std::size_t> rank(entries.size());
     for (std::size_t k = 0; k < order.places.size(); ++k) rank[order.places[k]] = k;
     while (rank[first] < rank[first + 1]) ++first;
-    const std::string what = paths[first].string() + " comes before " + paths[first + 1].string();
+    const std::string what = entries[first].path.string() + " comes before " + entries[first + 1].path.string();
     std::vector<std::string> texts;
-    for (const auto& path : paths) texts.push_back(path.string());
+    for (const auto& entry : entries) texts.push_back(entry.path.string());
     if (is_text_order(texts)) {
         remarks.push_back({"shell-order",
                            "the files come in the order of text, as a shell sorts them, in which " + what +

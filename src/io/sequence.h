@@ -48,6 +48,7 @@ Result<SequenceFiles> find_sequence(std::string_view what, const SequenceOptions
 
 // The same of several names, as a shell makes them of a pattern: of mesh files of one format. They stay in their order
 // unless that is how a shell sorts text: then they are taken by number. A remark says so if they are not by number.
+// Copies are left out as those of a folder; what is no frame by its name is one all the same, with a remark.
 Result<SequenceFiles> find_sequence(std::span<const std::string> names, const SequenceOptions& options = {});
 
 // The frame's number in each name (order_of_frames()), if the names differ only in numbers and these ascend; else

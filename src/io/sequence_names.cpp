@@ -88,10 +88,10 @@ SplitName split(std::string_view name) {
     return out;
 }
 
-// The same for names of one kind alone. No file name holds the character that separates.
+// The same for names of one kind alone.
 std::string key_of(const SplitName& name) {
     std::string key;
-    for (const auto& text : name.texts) key += lower(text) + '\0';
+    for (const auto& text : name.texts) key += std::to_string(text.size()) + ":" + lower(text);
     return key;
 }
 
@@ -324,7 +324,8 @@ Result<FrameOrder> order_by_all(const NumberedNames& all) {
     else if (all.varying.size() > 1)
         out.remarks.push_back(
             {"numbers-vary",
-             "several numbers in the names vary, as those of a date and a time: the frames are in the order of all",
+             "several numbers in the names vary, as those of a date and a time: the frames are in the order of all, "
+             "and their times are not taken from it (see --timestamps)",
              false});
     return out;
 }
@@ -447,10 +448,11 @@ Result<FrameOrder> order_of_frames(std::span<const std::string> names, std::stri
         remark_on(out, all, *best);
     }
     if (decimal)
-        out.remarks.push_back({"decimal-numbers",
-                               "the numbers in the names are decimal, as times are (" + all.text(out.places[0]) +
-                                   "): the frames are in their order",
-                               false});
+        out.remarks.push_back(
+            {"decimal-numbers",
+             "the numbers in the names are decimal, as times are (" + all.text(out.places[0]) +
+                 "): the frames are in their order, but their times are not taken from it (see --timestamps)",
+             false});
     return out;
 }
 

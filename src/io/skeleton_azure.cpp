@@ -281,9 +281,9 @@ std::vector<double> seconds_of(const std::vector<std::optional<double>>& stamps,
     return out;
 }
 
-// Of frames that do not say when they were taken: by their numbers, where they have some.
+// Of frames that do not say when they were taken.
 void number_frames(const json& frames, SkeletonTrack& track) {
-    track.notes.push_back("The file lacks timestamps: taken as 30 fps.");
+    track.notes.push_back("The file lacks timestamps: taken as 30 fps, or as the meshes.");
     track.rate_is_known = false;
     track.timestamps.clear();
     for (std::size_t t = 0; t < frames.size(); ++t) track.timestamps.push_back(static_cast<double>(t) / track.fps);

@@ -114,7 +114,9 @@ Result<void> read_clock(const json& document, SkeletonTrack& track) {
     }
     if (!timestamps) {
         track.rate_is_known = fps != nullptr;
-        if (!fps) track.notes.push_back("The skeleton file has neither fps nor timestamps: taken as 30 fps.");
+        if (!fps)
+            track.notes.push_back(
+                "The skeleton file has neither fps nor timestamps: taken as 30 fps, or as the meshes.");
         for (std::size_t t = 0; t < count; ++t) track.timestamps.push_back(static_cast<double>(t) / track.fps);
         return {};
     }

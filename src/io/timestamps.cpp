@@ -294,7 +294,9 @@ Result<bool> find_columns(const std::vector<std::string>& cells, std::vector<Col
         return fail(ErrorKind::bad_input, "of more than two columns, a first line must name them: frame,timestamp");
     columns = cells.size() == 2 ? std::vector<Column>{{.is_frame = true}, {.is_time = true}}
                                 : std::vector<Column>{{.is_time = true}};
-    return false;
+    // Names in whatever language.
+    return std::none_of(cells.begin(), cells.end(),
+                        [](const std::string& cell) { return cell.find_first_of("0123456789") != cell.npos; });
 }
 
 Result<FrameTimes> from_csv(std::string_view text, const FrameRate& rate) {

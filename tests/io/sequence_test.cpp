@@ -276,6 +276,22 @@ TEST_F(Sequence, NamedFilesThatAreCalledAlikeAreNumberedByTheirFolders) {
     EXPECT_THAT(files->numbers, ElementsAre(2u, 10u));
 }
 
+TEST_F(Sequence, OfNamedFilesWhatIsNoFrameIsOneAllTheSame) {
+    touch({"f1.ply", "f2.ply", "f3.ply", "f3_copy.ply", "mean.ply"});
+    std::vector<std::string> names;
+    for (const char* name : {"f1.ply", "f2.ply", "f3.ply", "f3_copy.ply", "mean.ply"})
+        names.push_back((folder / name).string());
+    const auto files = find_sequence(names);
+    ASSERT_TRUE(files) << files.error().message;
+    EXPECT_EQ(files->paths.size(), 4u);
+    ASSERT_EQ(files->remarks.size(), 2u);
+    EXPECT_THAT(files->remarks[0].text, HasSubstr("f3_copy.ply"));
+    EXPECT_THAT(files->remarks[1].text, HasSubstr("mean.ply is not named as most are"));
+    const auto without = find_sequence(names, {{"mean*"}});
+    EXPECT_THAT(without->numbers, ElementsAre(1u, 2u, 3u));
+    EXPECT_FALSE(find_sequence(names, {{"*"}}));
+}
+
 TEST_F(Sequence, NumbersBelowZeroCountFromTheLowest) {
     touch({"f-2.ply", "f-1.ply", "f0.ply", "f1.ply"});
     for (const char* what : {"", "f%d.ply"}) {

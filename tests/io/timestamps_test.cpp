@@ -126,7 +126,7 @@ TEST_F(FrameTimesFile, AsSpreadsheetsAndLoggersWriteThem) {
           "Frame;Time [s]\n7;0,0\n9;0,5\n", "sep=;\nFrame;Time\n7;0\n9;0,5\n", "frame\ttime_ms\r7\t0,0\r9\t500,0\r",
           "\"Frame\",\"Timestamp (us)\"\n\"7\",\"0\"\n\"9\",\"500000\"\n",
           "FRAME,TIMESTAMP_NS,note\n7,0,\"a, b\"\n9,500000000,\"c\"\n", "7 0.0\n9 0.5\n", "# a\n7, 0\n# b\n9, 0.5",
-          "7;00:00:00:00\n9;00:00:00:12\n",
+          "7;00:00:00:00\n9;00:00:00:12\n", "Bild;Zeit\n7;0\n9;0,5\n",
           "\xEF\xBB\xBF[{\"Frame\": 7, \"Timestamp_ns\": 0}, {\"Frame\": 9, \"timestampMs\": 500}]"}) {
         const auto times = read(text);
         ASSERT_TRUE(times) << text << ": " << times.error().message;
