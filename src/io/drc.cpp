@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "io/draco_geometry.h"
-#include "io/mesh_finite.h"
+#include "io/finite_mesh.h"
 
 namespace htvm {
 
@@ -137,8 +137,8 @@ Result<Mesh> read_drc(std::span<const std::uint8_t> bytes, const MeshReadOptions
                             mesh.texcoords, findings);
     if (!taken) return tl::unexpected(taken.error());
     mesh.triangles = std::move(geometry->triangles);
-    std::vector<std::uint16_t> no_parts;
-    if (auto ok = leave_out_not_finite(mesh, no_parts, findings); !ok) return tl::unexpected(ok.error());
+    MeshFindings unheard;
+    if (auto ok = leave_out_not_finite(mesh, findings ? *findings : unheard); !ok) return tl::unexpected(ok.error());
     if (auto ok = check_mesh(mesh); !ok) return tl::unexpected(ok.error());
     return mesh;
 }

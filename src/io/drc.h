@@ -4,7 +4,7 @@
 // for shares. Colours have 3 or 4 components (alpha is dropped), or 1 or 2, which are grey; of bytes, of integers that
 // are said to be shares, or of others whose range is that of the capture (colour_range.h). The first attribute of each
 // kind is used; more of them, and such as have too few components, are passed over with a remark. Vertices whose
-// positions are no numbers are left out (mesh_finite.h). Each of Draco's points becomes a vertex, in Draco's order,
+// positions are no numbers are left out (finite_mesh.h). Each of Draco's points becomes a vertex, in Draco's order,
 // with the attributes mapped to it; a vertex on a seam of an attribute thus appears once for each side. Faces keep
 // their order and orientation.
 //

@@ -9,7 +9,7 @@
 // NORMAL, COLOR_0 and the texture coordinates that the image uses, of floats or integers, sparse or not, or compressed
 // by Draco; triangles, strips, fans, or points alone, with indices or without. A vertex that lacks what others have is
 // white, has a zero normal, texture coordinate 0, 0. Primitives of one mesh that share their vertices go on sharing
-// them. Vertices whose positions are no numbers are left out (mesh_finite.h).
+// them. Vertices whose positions are no numbers are left out (finite_mesh.h).
 //
 // What it looks like is by gltf_material.h. TextureReference gets each image once, and a part for each look in the
 // order of the materials; colours of parts and of vertices multiply the image. Where nothing has an image, the

@@ -11,12 +11,12 @@
 #include "core/geometry.h"
 #include "core/srgb.h"
 #include "io/draco_geometry.h"
+#include "io/finite_mesh.h"
 #include "io/gltf.h"
 #include "io/gltf_accessor.h"
 #include "io/gltf_file.h"
 #include "io/gltf_material.h"
 #include "io/gltf_scene.h"
-#include "io/mesh_finite.h"
 #include "io/skeleton_json_value.h"
 
 namespace htvm {
@@ -499,9 +499,10 @@ Result<Mesh> read_gltf(std::span<const std::uint8_t> bytes, const std::filesyste
     drop_what_is_not_there(reading);
     auto texture = texture_of(reading);
     if (!texture) return tl::unexpected(texture.error());
-    if (auto ok = leave_out_not_finite(reading.mesh, texture->part_of_triangle, findings); !ok)
-        return tl::unexpected(ok.error());
-    if (findings) findings->texture = std::move(*texture);
+    MeshFindings unheard;
+    auto& told = findings ? *findings : unheard;
+    told.texture = std::move(*texture);
+    if (auto ok = leave_out_not_finite(reading.mesh, told); !ok) return tl::unexpected(ok.error());
     return std::move(reading.mesh);
 }
 

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "core/bytes.h"
-#include "io/mesh_finite.h"
+#include "io/finite_mesh.h"
 
 namespace htvm {
 
@@ -259,8 +259,8 @@ Result<Mesh> read_vologram_frame(const Vologram& vologram, std::size_t number, c
     for (const auto& triangle : mesh.triangles)
         if (std::ranges::any_of(triangle, [&](auto index) { return index >= mesh.positions.size(); }))
             return not_readable("a triangle uses a vertex that is not there");
-    std::vector<std::uint16_t> no_parts;
-    if (auto ok = leave_out_not_finite(mesh, no_parts, findings); !ok) return tl::unexpected(ok.error());
+    MeshFindings unheard;
+    if (auto ok = leave_out_not_finite(mesh, findings ? *findings : unheard); !ok) return tl::unexpected(ok.error());
     if (auto ok = check_mesh(mesh); !ok) return tl::unexpected(ok.error());
     return mesh;
 }
