@@ -1,13 +1,13 @@
 #include "io/obj_line.h"
 
-#include <algorithm>
-
 namespace htvm {
 
 namespace {
 
 // Also zero bytes and the control-Z with which old systems end a text.
-constexpr std::string_view blanks{" \t\r\v\f\x1a\0", 7};
+bool is_blank(char c) {
+    return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f' || c == '\x1a' || c == '\0';
+}
 
 // The length of the line's end, at which the text begins.
 std::size_t length_of_end(std::string_view text) {
@@ -26,8 +26,8 @@ std::string_view read_line(std::string_view& text, std::size_t& line_number, std
         text.remove_prefix(end);
         if (!text.empty()) text.remove_prefix(length_of_end(text));
         ++line_number;
-        const bool is_comment = joined.empty() && trimmed(line).starts_with('#');
-        const bool continues = line.ends_with('\\') && !text.empty() && !is_comment;
+        const bool continues =
+            line.ends_with('\\') && !text.empty() && !(joined.empty() && trimmed(line).starts_with('#'));
         if (continues) line.remove_suffix(1);
         if (joined.empty() && !continues) return line;
         joined += line;
@@ -37,18 +37,19 @@ std::string_view read_line(std::string_view& text, std::size_t& line_number, std
 }
 
 std::string_view read_word(std::string_view& line) {
-    const std::size_t begin = line.find_first_not_of(blanks);
-    if (begin == line.npos) return line = {};
-    const std::size_t end = std::min(line.find_first_of(blanks, begin), line.size());
+    std::size_t begin = 0;
+    while (begin < line.size() && is_blank(line[begin])) ++begin;
+    std::size_t end = begin;
+    while (end < line.size() && !is_blank(line[end])) ++end;
     const std::string_view word = line.substr(begin, end - begin);
     line.remove_prefix(end);
     return word;
 }
 
 std::string_view trimmed(std::string_view line) {
-    const std::size_t begin = line.find_first_not_of(blanks);
-    if (begin == line.npos) return {};
-    return line.substr(begin, line.find_last_not_of(blanks) + 1 - begin);
+    while (!line.empty() && is_blank(line.front())) line.remove_prefix(1);
+    while (!line.empty() && is_blank(line.back())) line.remove_suffix(1);
+    return line;
 }
 
 }  // namespace htvm

@@ -32,7 +32,7 @@ double turn(const Point& a, const Point& b, const Point& c) {
 }
 
 // The number of looks at a corner that a mesh may take: about a second.
-constexpr std::uint64_t most_looks = std::uint64_t{1} << 28;
+constexpr std::uint64_t most_looks = std::uint64_t{1} << 26;
 
 // A polygon in its plane, counterclockwise, from which ears are cut off. Kept from one polygon to the next for its
 // memory.
