@@ -46,14 +46,14 @@ Result<void> check_image_size(std::uint64_t width, std::uint64_t height, int lar
 double share_missing(const Image& image, std::size_t channels, const BlockSize& block, std::uint8_t level) {
     const auto width = static_cast<std::size_t>(image.width);
     const auto is_missing = [&](int left, int top) {
-        const int right = std::min(left + block.width, image.width);
-        for (int y = top; y < std::min(top + block.height, image.height); ++y) {
-            const auto row =
-                image.rgb.begin() + static_cast<std::ptrdiff_t>(channels * width * static_cast<std::size_t>(y));
-            const auto begin = static_cast<std::ptrdiff_t>(channels) * left,
-                       end = static_cast<std::ptrdiff_t>(channels) * right;
-            if (std::any_of(row + begin, row + end, [&](std::uint8_t value) { return value != level; })) return false;
-        }
+        const int right = std::min(left + block.width, image.width) - block.border;
+        const int bottom = std::min(top + block.height, image.height) - block.border;
+        for (int y = top + block.border; y < bottom; ++y)
+            for (int x = left + block.border; x < right; ++x) {
+                const auto at = channels * (width * static_cast<std::size_t>(y) + static_cast<std::size_t>(x));
+                for (std::size_t c = 0; c < channels; ++c)
+                    if (image.rgb[at + c] != level) return false;
+            }
         return true;
     };
     const int across = (image.width - 1) / block.width + 1, down = (image.height - 1) / block.height + 1;

@@ -54,6 +54,7 @@ Result<void> check_image_size(std::uint64_t width, std::uint64_t height, int lar
 // all channels of all pixels have that level.
 struct BlockSize {
     int width = 1, height = 1;
+    int border = 0;  // pixels at the edges of a block that neighbours reach into
 };
 double share_missing(const Image& image, std::size_t channels, const BlockSize& block, std::uint8_t level);
 // What `damage` says of an image that lacks so much. Fails (bad_input) if that is more than half.

@@ -84,7 +84,7 @@ Result<Image> read_jpeg_image(std::span<const std::uint8_t> bytes, int largest_s
     const std::string warning = result != 0 ? tjGetErrorStr2(jpeg.get()) : "";
     if (!warning.empty() && !(is_harmless(warning) && had_end)) {
         constexpr std::uint8_t middle = 128;  // what is not there is decoded as if all coefficients were 0
-        const double missing = share_missing(out, static_cast<std::size_t>(channels), {16, 16}, middle);
+        const double missing = share_missing(out, static_cast<std::size_t>(channels), {16, 16, 2}, middle);
         auto said = damage_of("JPEG", missing, warning);
         if (!said) return tl::unexpected(said.error());
         if (damage && !(is_harmless(warning) && missing == 0)) *damage = std::move(*said);
