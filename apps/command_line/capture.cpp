@@ -167,9 +167,9 @@ void add_texture_options(CLI::App& command, TextureOptions& options) {
     command
         .add_option(
             "--texture", options.files,
-            "The texture, PNG, JPEG or WebP: an image for all meshes, a pattern such as tex_%05d.jpg for one each,\n"
-            "a video of one each, which ffmpeg decodes, or none (default: the image that the meshes' files name, else\n"
-            "the one beside a mesh that is called like it)")
+            "The texture, PNG, JPEG, WebP, BMP, TGA or DDS: an image for all meshes, a pattern such as\n"
+            "tex_%05d.jpg for one each, a video of one each, which ffmpeg decodes, or none (default: the image that\n"
+            "the meshes' files name, else the one beside a mesh that is called like it)")
         ->type_name("FILE")
         ->group(heading::textures);
     constexpr std::array edges = {Choice<TextureOrigin>{"bottom", TextureOrigin::bottom},
@@ -471,6 +471,11 @@ Result<void> Capture::read_first_again() {
     } else if (auto ok = scale_positions(peeked_->mesh, millimetres_per_unit_); !ok) {
         return ok;
     }
+    if (keeps_pictures(options_.texture_as) && textures_.findings().texture.colours_multiply && peeked_->texture &&
+        !peeked_->mesh.colours.empty())
+        warn(
+            "the colours at vertices, which multiply those of the images, are left out of the pictures; --texture-as "
+            "colours has both");
     tell(textures_.findings().remarks, pipe_ ? name() : files_.paths[peeked_at_].string());
     has_texture_ = peeked_->texture != nullptr;
     find_floor();
@@ -483,7 +488,8 @@ Result<void> Capture::read_first_again() {
 void Capture::tell(const std::vector<MeshRemark>& remarks, const std::string& name) const {
     const std::lock_guard lock(told_->mutex);
     for (const auto& [about, text, is_loss] : remarks) {
-        if (!told_->about.insert(about).second) continue;
+        const bool is_told_of_texture = about == "no-image" && !is_loss;  // tell_of_texture() says it of all
+        if (is_told_of_texture || !told_->about.insert(about).second) continue;
         const auto line = fmt::format("{}: {}; other frames like it are not told", name, text);
         is_loss ? warn(line) : note(line);
     }

@@ -82,8 +82,8 @@ public:
     // Once it is finished: whether it begins with an index.
     bool has_index() const { return has_index_; }
     bool has_bounds() const { return indexer_.bounds().has_value(); }
-    // A stream that ends early: what is left of it beside its place, cut where its last whole packet ends, as a full disk
-    // may have taken a part of one. Without a name where it went to a pipe, or no frame is whole.
+    // A stream that ends early: what is left of it beside its place, cut where its last whole packet ends, as a full
+    // disk may have taken a part of one. Without a name where it went to a pipe, or no frame is whole.
     struct Kept {
         std::string name;
         std::size_t frames = 0;

@@ -275,9 +275,9 @@ htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* fi
 htvm_status htvm_decoder_metadata(htvm_decoder* decoder, uint32_t entry, char* key, size_t key_capacity, char* value,
                                   size_t value_capacity);
 
-/* What was taken off the capture's coordinates, mm: added to decoded positions, as doubles, it gives the capture's own
- * back. Zeros as a rule. HTVM_AGAIN until a sequence header was decoded. */
-htvm_status htvm_decoder_global_shift(htvm_decoder* decoder, int64_t shift[3]);
+/* Writes three numbers: what was taken off the capture's x, y and z, mm. Added to decoded positions, as doubles, it
+ * gives the capture's own back. Zeros as a rule. HTVM_AGAIN until a sequence header was decoded. */
+htvm_status htvm_decoder_global_shift(htvm_decoder* decoder, int64_t* shift);
 
 /* Where the current frame's bytes went: bytes[0] headers, counts and checksums, bytes[n] the layer of number n
  * (docs/bitstream.md, section 4). HTVM_LAYERS numbers are always enough. HTVM_BAD_INPUT: there is no current frame.
@@ -461,9 +461,9 @@ htvm_status htvm_encoder_options_add_metadata(htvm_encoder_options* options, con
 /* Says where the floor is, mm: its coordinate on the axis that the option "up" names. */
 htvm_status htvm_encoder_options_set_floor(htvm_encoder_options* options, double floor);
 
-/* Says what the caller took off the capture's coordinates before they became floats, mm, each below 2^53 either way:
- * the stream keeps it for htvm_decoder_global_shift(). */
-htvm_status htvm_encoder_options_set_global_shift(htvm_encoder_options* options, const int64_t shift[3]);
+/* Says what the caller took off the capture's x, y and z before they became floats: three numbers, mm, each below 2^53
+ * either way; the stream keeps it for htvm_decoder_global_shift(). */
+htvm_status htvm_encoder_options_set_global_shift(htvm_encoder_options* options, const int64_t* shift);
 
 /* Provides the encoder's threads, of which it uses at most as many at once as the option "threads" says. NULL, the
  * default: a pool of the encoder's own. user is passed to run_tasks. */

@@ -357,7 +357,7 @@ htvm_status htvm_decoder_metadata(htvm_decoder* decoder, uint32_t entry, char* k
     return HTVM_OK;
 }
 
-htvm_status htvm_decoder_global_shift(htvm_decoder* decoder, int64_t shift[3]) {
+htvm_status htvm_decoder_global_shift(htvm_decoder* decoder, int64_t* shift) {
     if (!decoder) return HTVM_BAD_INPUT;
     const auto& sequence = decoder->decoder.sequence();
     if (!sequence) return HTVM_AGAIN;

@@ -224,7 +224,7 @@ htvm_status htvm_encoder_options_set_floor(htvm_encoder_options* options, double
     return HTVM_OK;
 }
 
-htvm_status htvm_encoder_options_set_global_shift(htvm_encoder_options* options, const int64_t shift[3]) {
+htvm_status htvm_encoder_options_set_global_shift(htvm_encoder_options* options, const int64_t* shift) {
     if (!options) return HTVM_BAD_INPUT;
     if (!shift) return options->error.set(HTVM_BAD_INPUT, "shift is NULL");
     std::copy_n(shift, 3, options->options.global_shift.begin());

@@ -289,7 +289,7 @@ TEST(OptionList, EveryOptionChangesTheBytesButThreads) {
         bool changes = false;
         for (auto settings : settings_for(option)) {
             const bool patches = std::string(option.name) == "tracked.patch_share";
-            const auto& tried_on = patches                                ? lost_in_part
+            const auto& tried_on = patches                                 ? lost_in_part
                                    : std::string(option.name) == "normals" ? with_normals
                                                                            : sequence;
             if (patches) settings.subject_size = patched_options().subject_size;

@@ -2,10 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tuple>
 
 #include <algorithm>
 #include <cstdlib>
+#include <tuple>
 
 #include "io/image_samples.h"
 #include "io/mesh_samples.h"
