@@ -457,8 +457,9 @@ struct Options {
     std::string decoded;                 // and the last
     std::optional<LengthUnit> unit;      // of files; not given: guessed from the first one
     std::string timestamps;
-    std::string truth;       // folder; empty: no drift
-    std::size_t frames = 0;  // 0: all
+    std::vector<std::string> ignored;  // globs: files that are no frames
+    std::string truth;                 // folder; empty: no drift
+    std::size_t frames = 0;            // 0: all
     std::vector<std::string> only;
     CompareOptions compare;
     unsigned threads = 0;
@@ -519,7 +520,8 @@ bool guess_fits_better(MeshSource original, MeshSource decoded) {
 }
 
 Result<Sources> open_sources(const Options& options) {
-    auto original = open_meshes(options.originals, {options.unit, options.timestamps, options.limits, options.texture});
+    auto original = open_meshes(options.originals,
+                                {options.unit, options.timestamps, options.limits, options.texture, options.ignored});
     if (!original) return tl::unexpected(original.error());
     auto decoded = open_meshes({options.decoded}, {options.unit, "", options.limits, {}});
     if (!decoded) return tl::unexpected(decoded.error());
@@ -887,6 +889,10 @@ void add_sequences(CLI::App& command, Options& o) {
             "--timestamps", o.timestamps,
             "When each original was captured, as for 'htvm encode', if frames of a stream are to find theirs by it")
         ->type_name("FILE")
+        ->group(heading::input);
+    command.add_option("--ignore", o.ignored, "Originals that are no frames, by a glob, as for 'htvm encode'")
+        ->type_name("GLOB")
+        ->allow_extra_args(false)
         ->group(heading::input);
     add_texture_options(command, o.texture);
 }

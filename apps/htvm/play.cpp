@@ -56,7 +56,7 @@ struct TemporaryFolder {
 
 Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeRequest request,
                                 TemporaryFolder& folder) {
-    if (const auto files = find_frames(inputs); !files) return tl::unexpected(files.error());
+    if (const auto files = find_frames(inputs, {request.capture.ignored}); !files) return tl::unexpected(files.error());
     if (!folder.make()) return fail(ErrorKind::bad_input, "there is no place for a temporary file (TMPDIR)");
     auto capture = fs::absolute(inputs[0]).lexically_normal();
     if (capture.filename().empty()) capture = capture.parent_path();

@@ -163,7 +163,7 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
                 name + " is a stream, whose texture is inside; --texture and --texture-origin are for mesh files");
         return open_stream(name, options.limits);
     }
-    const auto files = find_frames(names);
+    const auto files = find_frames(names, {options.ignored});
     if (!files) return tl::unexpected(files.error());
     MeshSource source;
     source.name = names.size() == 1 ? name : "the files";

@@ -43,10 +43,11 @@ struct MeshSource {
 };
 
 struct MeshSourceOptions {
-    std::optional<LengthUnit> unit;  // of files; not given: guessed from the first one
-    std::string timestamps;          // of files: a file of times (io/timestamps.h); empty: as PLY files say
-    DecoderOptions limits;           // of streams
-    TextureOptions texture;          // of files
+    std::optional<LengthUnit> unit;         // of files; not given: guessed from the first one
+    std::string timestamps;                 // of files: a file of times (io/timestamps.h); empty: as PLY files say
+    DecoderOptions limits;                  // of streams
+    TextureOptions texture;                 // of files
+    std::vector<std::string> ignored = {};  // of files: as SequenceOptions has it
 };
 
 // An .htvm stream, or the files that the names refer to (io/sequence.h).

@@ -95,7 +95,7 @@ CompareOptions compare_options(const Options& options) {
 
 // Everything that a result depends on besides its coder and quality.
 Result<std::string> common_key(const Options& options) {
-    const auto files = find_sequence(options.capture.inputs);
+    const auto files = find_sequence(options.capture.inputs, {options.capture.ignored});
     if (!files) return tl::unexpected(files.error());
     auto inputs = files->paths;
     auto textures = TextureFiles::open(options.capture.texture, *files);

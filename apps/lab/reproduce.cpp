@@ -115,7 +115,7 @@ Result<std::vector<Pose>> poses_for_noise(const Options& options, const SourceFr
 }
 
 Result<Laboratory> laboratory_of(const Options& options, const SourceFrames& source) {
-    const auto files = find_sequence(options.capture.inputs);
+    const auto files = find_sequence(options.capture.inputs, {options.capture.ignored});
     if (!files) return tl::unexpected(files.error());
     auto inputs = files->paths;
     auto textures = TextureFiles::open(options.capture.texture, *files);
