@@ -461,6 +461,28 @@ void Capture::find_kind() {
                          *colour_range_ == ColourRange::bytes ? 255 : 65535));
 }
 
+// The step of floats as far from the origin as the shift is, mm, if the file's coordinates lie on it: it held floats.
+// 0: it did not, or there is no shift. The mesh is without the shift, in mm.
+double step_of_floats(const Mesh& mesh, const GlobalShift& shift, double millimetres_per_unit) {
+    double step = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+        const auto farthest = static_cast<float>(static_cast<double>(shift[c]) / millimetres_per_unit);
+        if (farthest == 0) continue;
+        const double of_axis = static_cast<double>(std::nextafter(std::abs(farthest), 3e38f) - std::abs(farthest));
+        // Next to a power of two the step changes.
+        const double finest = of_axis / 2;
+        const double origin = static_cast<double>(shift[c]) / millimetres_per_unit;
+        constexpr std::size_t most = 200;
+        for (std::size_t v = 0; v < mesh.positions.size(); v += mesh.positions.size() / most + 1) {
+            const double steps = (static_cast<double>(mesh.positions[v][c]) / millimetres_per_unit + origin) / finest;
+            if (std::abs(steps - std::round(steps)) > 0.05) return 0;
+        }
+        step = std::max(step, of_axis * millimetres_per_unit);
+    }
+    return step;
+}
+constexpr double coarse_step = 0.05;  // mm: below that it shows nowhere
+
 // The first mesh, as all are read from here on.
 Result<void> Capture::read_first_again() {
     const bool is_other = shift_ != GlobalShift{} || colour_range_;
@@ -476,6 +498,10 @@ Result<void> Capture::read_first_again() {
         warn(
             "the colours at vertices, which multiply those of the images, are left out of the pictures; --texture-as "
             "colours has both");
+    if (const double step = step_of_floats(peeked_->mesh, shift_, millimetres_per_unit_); step > coarse_step)
+        warn(fmt::format("the files hold floats, which are exact to {} there: where they are written, take the distance "
+                         "off first, or write doubles",
+                         length_text(step)));
     tell(textures_.findings().remarks, pipe_ ? name() : files_.paths[peeked_at_].string());
     has_texture_ = peeked_->texture != nullptr;
     find_floor();
@@ -584,6 +610,7 @@ Result<Capture::Encodable> Capture::read(TextureFiles& files, std::size_t place,
     if (!mesh) return tl::unexpected(mesh.error());
     auto out = as_encoded(std::move(*mesh), wanted);
     out.remarks = files.findings().remarks;
+    out.levels = files.findings().colour_levels;
     return out;
 }
 
@@ -689,7 +716,9 @@ Result<std::optional<Mesh>> Capture::next() {
         auto mesh = read_pipe();
         if (!mesh) return tl::unexpected(mesh.error());
         if (!*mesh) return std::optional<Encodable>{};
-        return std::optional<Encodable>{as_encoded(std::move(**mesh), wanted())};
+        auto out = as_encoded(std::move(**mesh), wanted());
+        out.levels = textures_.findings().colour_levels;
+        return std::optional<Encodable>{std::move(out)};
     };
     auto frame = pipe_ ? of_pipe() : read_file();
     if (!frame || *frame) ++taken_;
@@ -700,7 +729,7 @@ Result<std::optional<Mesh>> Capture::next() {
                                                       "gives its place, --texture-as coordinates does without images",
                                                       name()));
     tell((*frame)->remarks, name());
-    if (const auto why = kind_.unlike((*frame)->mesh, (*frame)->textured != nullptr); !why.empty()) {
+    if (const auto why = kind_.unlike((*frame)->mesh, (*frame)->levels, (*frame)->textured != nullptr); !why.empty()) {
         if (!pipe_) return fail(ErrorKind::bad_input, fmt::format("{}: {}", name(), why));
         // What is live goes on: there is no other frame to take.
         tell({{"unlike", why, true}}, name());

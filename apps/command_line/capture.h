@@ -160,6 +160,7 @@ private:
         Mesh mesh;
         std::shared_ptr<const TexturedMesh> textured;
         std::vector<MeshRemark> remarks = {};
+        ColourLevels levels = {};  // of colours whose type does not say their range
     };
     // Which pictures the stream has: those of the capture, or of its own layout.
     enum class PicturesOf { nothing, capture, stream };

@@ -55,6 +55,7 @@ double size_of(const Mesh& mesh) {
 
 void CaptureKind::add(const Mesh& mesh, const MeshFindings& findings, bool has_texture) {
     levels_ += findings.colour_levels;
+    if (const auto range = certain_range_of(findings.colour_levels)) ++of_range_[static_cast<std::size_t>(*range)];
     if (mesh.positions.empty()) return;
     if (size_ == 0) size_ = size_of(mesh);
     ++meshes_;
@@ -62,25 +63,33 @@ void CaptureKind::add(const Mesh& mesh, const MeshFindings& findings, bool has_t
 }
 
 std::optional<ColourRange> CaptureKind::colour_range() const {
-    return levels_.any() ? std::optional(colour_range_of(levels_)) : std::nullopt;
+    if (!levels_.any()) return std::nullopt;
+    const auto most = std::max_element(of_range_.begin(), of_range_.end());
+    return *most > 0 ? static_cast<ColourRange>(most - of_range_.begin()) : colour_range_of(levels_);
 }
 
-std::string CaptureKind::unlike(const Mesh& mesh, bool has_texture) const {
+namespace {
+
+const char* name_of(ColourRange range) {
+    return range == ColourRange::unit ? "0 to 1" : range == ColourRange::bytes ? "0 to 255" : "0 to 65535";
+}
+
+}  // namespace
+
+std::string CaptureKind::unlike(const Mesh& mesh, const ColourLevels& levels, bool has_texture) const {
     if (meshes_ == 0 || mesh.positions.empty()) return {};
     const bool are_coloured = 2 * coloured_ >= meshes_, is_coloured = has_texture || !mesh.colours.empty();
     if (are_coloured && !is_coloured) return "it has no colours, as the other frames have";
     if (!are_coloured && is_coloured) return "it has colours, which the other frames have not";
+    const auto range = certain_range_of(levels), of_others = colour_range();
+    if (range && of_others && *range != *of_others)
+        return fmt::format("its colours are {}, those of the other frames {}", name_of(*range), name_of(*of_others));
     constexpr double most = 10;  // a person who crouches or spreads the arms changes by less than two
     const double size = size_of(mesh);
     if (size_ > 0 && size > 0 && std::max(size / size_, size_ / size) > most)
-        return size < size_ ? fmt::format(
-                                  "it is {:.0f} times smaller than the first frame: of another capture, or in "
-                                  "another unit",
-                                  size_ / size)
-                            : fmt::format(
-                                  "it is {:.0f} times larger than the first frame: of another capture, or in "
-                                  "another unit",
-                                  size / size_);
+        return fmt::format(
+            "it is {:.0f} times {} than the first frame: one of the two is of another capture, or in another unit",
+            std::max(size / size_, size_ / size), size < size_ ? "smaller" : "larger");
     return {};
 }
 

@@ -2,6 +2,7 @@
 // colours are in, whether frames ought to have colours, or that the second half of a folder is another capture.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -31,12 +32,13 @@ public:
     // Nothing where types say it.
     std::optional<ColourRange> colour_range() const;
     // Why a mesh, positions in mm, is none of these: a clause behind its name. Empty: it is like the others.
-    std::string unlike(const Mesh& mesh, bool has_texture) const;
+    std::string unlike(const Mesh& mesh, const ColourLevels& levels, bool has_texture) const;
 
 private:
     std::size_t meshes_ = 0, coloured_ = 0;
     double size_ = 0;  // of the first with vertices
     ColourLevels levels_;
+    std::array<std::size_t, 3> of_range_{};  // meshes that leave no doubt about their colours' range, by range
 };
 
 }  // namespace htvm::app

@@ -45,7 +45,6 @@ struct CheckedFrame {
 struct Trial {
     std::size_t frames = 0, intra = 0, patched = 0;
     double megabits_per_second = 0;
-    std::string failed;  // why it ended early; empty: it did not
 };
 
 struct Report {
@@ -90,16 +89,16 @@ public:
         options.global_shift = capture.global_shift();
         if (auto created = Encoder::create(options)) encoder_.emplace(std::move(*created));
     }
-    void add(const Mesh& mesh, std::int64_t timestamp_us) {
-        if (!encoder_ || trial_.frames >= most_ || !trial_.failed.empty() || mesh.triangles.empty()) return;
+    // Why the frame cannot be coded; empty: it can, or is not tried.
+    std::string add(const Mesh& mesh, std::int64_t timestamp_us) {
+        if (!encoder_ || trial_.frames >= most_ || mesh.triangles.empty()) return {};
         Mesh pushed_mesh = mesh;
         pushed_mesh.texcoords.clear();  // as encode leaves them out, where its image does not become colours
-        if (const auto pushed = encoder_->push(pushed_mesh, nullptr, timestamp_us); !pushed) {
-            trial_.failed = pushed.error().message;
-            return;
-        }
+        if (const auto pushed = encoder_->push(pushed_mesh, nullptr, timestamp_us); !pushed)
+            return pushed.error().message;
         ++trial_.frames;
         count();
+        return {};
     }
     Trial finish() {
         if (encoder_) {
@@ -136,6 +135,7 @@ Result<Report> look_at_all(const Options& options) {
     TrialRun trial(*capture, options.trial);
     Progress progress("check", capture->frames());
     std::vector<Vector3f> before;
+    std::optional<std::array<std::int32_t, 3>> origin;  // of the first frame
     while (interruption() == 0) {
         auto mesh = capture->next();
         if (mesh && !*mesh) break;
@@ -153,7 +153,15 @@ Result<Report> look_at_all(const Options& options) {
         auto frame = look_at(*capture, **mesh);
         frame.missing_before = capture->missing_before();
         frame.repeats = !before.empty() && before == (*mesh)->positions;
-        trial.add(**mesh, frame.timestamp_us);
+        // As far from the first frame as a stream's coordinates reach, whether it is tried or not.
+        auto why = trial.add(**mesh, frame.timestamp_us);
+        if (!origin)
+            if (const auto found = internal::lattice_origin(**mesh)) origin = *found;
+        constexpr int bits = 5;  // of the lattice that encode takes for people
+        if (origin && why.empty())
+            if (const auto reached = internal::to_lattice(**mesh, internal::Lattice{*origin, bits}); !reached)
+                why = reached.error().message;
+        if (!why.empty()) frame.wrong = frame.name + ": " + why;
         before = std::move((*mesh)->positions);
         report.frames.push_back(std::move(frame));
         progress.step();
@@ -260,7 +268,6 @@ void advise(const Report& report, Judgement& j) {
     if (count_of(report, [](const auto& f) { return !f.colours && f.texture_width == 0; }) == j.readable &&
         j.readable > 0)
         say("there are no colours: neither at vertices nor in an image that was found");
-    if (!report.trial.failed.empty()) say("encoding failed: " + report.trial.failed);
 }
 
 Judgement judge(const Report& report) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 namespace htvm {
 
@@ -11,6 +12,7 @@ enum class ColourRange : std::uint8_t { unit, bytes, words };  // 0..1, 0..255, 
 // How many components lie where: of one mesh, or added up over a capture. Zeros say nothing and are not counted.
 struct ColourLevels {
     std::uint64_t up_to_unit = 0, up_to_bytes = 0, above = 0;
+    std::uint64_t fractions = 0;  // of those up to 1, which are not whole numbers
     void count(double value);
     ColourLevels& operator+=(const ColourLevels& other);
     bool any() const { return up_to_unit + up_to_bytes + above > 0; }
@@ -18,6 +20,9 @@ struct ColourLevels {
 
 // The range by the bulk of the components: a few beyond it are clamped. unit where nothing is known.
 ColourRange colour_range_of(const ColourLevels& levels);
+
+// The range that these alone leave no doubt about: nothing for so dark a frame that its levels may be 0 and 1 of 255.
+std::optional<ColourRange> certain_range_of(const ColourLevels& levels);
 
 // A component as 0..255: rounded, clamped; not a number is 0.
 std::uint8_t colour_level(double value, ColourRange range);

@@ -475,14 +475,10 @@ std::optional<FrameOrder> order_by_first_number(std::span<const std::string> nam
 
 std::optional<std::uint64_t> frame_step(std::span<const std::uint64_t> numbers) {
     if (numbers.size() < 2) return std::uint64_t{1};
-    std::map<std::uint64_t, std::size_t> steps;
-    for (std::size_t k = 1; k < numbers.size(); ++k) ++steps[numbers[k] - numbers[k - 1]];
-    const auto usual =
-        std::max_element(steps.begin(), steps.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-    for (const auto number : numbers)
-        if ((number - numbers[0]) % usual->first != 0) return std::nullopt;
-    if ((numbers.back() - numbers[0]) / usual->first >= 2 * numbers.size()) return std::nullopt;
-    return usual->first;
+    std::uint64_t step = 0;
+    for (std::size_t k = 1; k < numbers.size(); ++k) step = std::gcd(step, numbers[k] - numbers[k - 1]);
+    if (step == 0 || (numbers.back() - numbers[0]) / step >= 2 * numbers.size()) return std::nullopt;
+    return step;
 }
 
 std::optional<std::string> original_of_copy(std::string_view name) {

@@ -52,8 +52,8 @@ Result<FrameOrder> order_of_frames(std::span<const std::string> names, std::stri
 // ("0001_walk", "0002_run"); nothing of others.
 std::optional<FrameOrder> order_by_first_number(std::span<const std::string> names);
 
-// What ascending numbers step by most often, which is one frame; nothing if they do not count frames: not all steps
-// are multiples of it, or more frames would be missing than there are (numbers that are times of a clock).
+// The largest number that all steps of ascending numbers are multiples of, which is one frame: 10 where every tenth
+// file was kept. Nothing if they do not count frames: more would be missing than there are (times of a clock).
 std::optional<std::uint64_t> frame_step(std::span<const std::uint64_t> numbers);
 
 // The name, without extension, that one is a copy of, as people and file managers mark copies ("f_3 (1)", "f_3 -

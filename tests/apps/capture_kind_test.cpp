@@ -36,40 +36,55 @@ TEST(GlobalShift, IsOfTheSurfaceNotOfUnusedVertices) {
 TEST(CaptureKind, TellsFramesWithoutTheColoursThatOthersHave) {
     CaptureKind kind;
     for (int i = 0; i < 3; ++i) kind.add(person(), {}, false);
-    EXPECT_EQ(kind.unlike(person(), false), "");
-    EXPECT_THAT(kind.unlike(person(1, 0, false), false), HasSubstr("no colours"));
-    EXPECT_EQ(kind.unlike(person(1, 0, false), true), "") << "an image gives them";
-    EXPECT_EQ(kind.unlike({}, false), "") << "an empty mesh is of every kind";
+    EXPECT_EQ(kind.unlike(person(), {}, false), "");
+    EXPECT_THAT(kind.unlike(person(1, 0, false), {}, false), HasSubstr("no colours"));
+    EXPECT_EQ(kind.unlike(person(1, 0, false), {}, true), "") << "an image gives them";
+    EXPECT_EQ(kind.unlike({}, {}, false), "") << "an empty mesh is of every kind";
 }
 
 TEST(CaptureKind, TellsFramesWithColoursAmongThoseWithout) {
     CaptureKind kind;
     for (int i = 0; i < 3; ++i) kind.add(person(1, 0, false), {}, false);
-    EXPECT_THAT(kind.unlike(person(), false), HasSubstr("has colours"));
+    EXPECT_THAT(kind.unlike(person(), {}, false), HasSubstr("has colours"));
 }
 
 TEST(CaptureKind, TellsFramesOfAnotherSize) {
     CaptureKind kind;
     kind.add(person(), {}, false);
-    EXPECT_EQ(kind.unlike(person(0.4f), false), "") << "somebody crouches";
-    EXPECT_THAT(kind.unlike(person(0.001f), false), HasSubstr("1000 times smaller"));
-    EXPECT_THAT(kind.unlike(person(25), false), HasSubstr("25 times larger"));
+    EXPECT_EQ(kind.unlike(person(0.4f), {}, false), "") << "somebody crouches";
+    EXPECT_THAT(kind.unlike(person(0.001f), {}, false), HasSubstr("1000 times smaller"));
+    EXPECT_THAT(kind.unlike(person(25), {}, false), HasSubstr("25 times larger"));
     auto with_stray = person();
     with_stray.positions.push_back({4e5f, 0, 4e5f});
     with_stray.colours.push_back({0, 0, 0});
-    EXPECT_EQ(kind.unlike(with_stray, false), "") << "a flying vertex is no other size";
+    EXPECT_EQ(kind.unlike(with_stray, {}, false), "") << "a flying vertex is no other size";
 }
 
 TEST(CaptureKind, AddsUpTheColoursOfFrames) {
     CaptureKind kind;
     EXPECT_EQ(kind.colour_range(), std::nullopt) << "types say it";
-    MeshFindings dark, bright;
+    MeshFindings dark, bright, unit;
     for (int i = 0; i < 10; ++i) dark.colour_levels.count(1);
     for (int i = 0; i < 1000; ++i) bright.colour_levels.count(130);
     kind.add(person(), dark, false);
     EXPECT_EQ(kind.colour_range(), ColourRange::unit);
     kind.add(person(), bright, false);
     EXPECT_EQ(kind.colour_range(), ColourRange::bytes);
+    for (int i = 0; i < 100; ++i) unit.colour_levels.count(0.004 * i);
+    EXPECT_THAT(kind.unlike(person(), unit.colour_levels, false),
+                HasSubstr("its colours are 0 to 1, those of the other frames 0 to 255"));
+    EXPECT_EQ(kind.unlike(person(), dark.colour_levels, false), "") << "so dark a frame may be of any range";
+}
+
+TEST(CaptureKind, OneFrameOfAnotherRangeDoesNotDecideForTheOthers) {
+    CaptureKind kind;
+    MeshFindings unit, bytes;
+    for (int i = 0; i < 100; ++i) unit.colour_levels.count(0.004 * i);
+    for (int i = 0; i < 100; ++i) bytes.colour_levels.count(2 * i);
+    for (int i = 0; i < 3; ++i) kind.add(person(), unit, false);
+    kind.add(person(), bytes, false);
+    EXPECT_EQ(kind.colour_range(), ColourRange::unit);
+    EXPECT_THAT(kind.unlike(person(), bytes.colour_levels, false), HasSubstr("its colours are 0 to 255"));
 }
 
 }  // namespace
