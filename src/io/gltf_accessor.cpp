@@ -5,8 +5,6 @@
 #include <limits>
 #include <string>
 
-#include "io/skeleton_json_value.h"
-
 namespace htvm::internal {
 namespace {
 
@@ -35,7 +33,7 @@ std::size_t bytes_of(std::uint64_t component) {
 
 // 0: a type that is not read here.
 std::size_t components_of(const json& accessor) {
-    const auto* type = find_member(accessor, "type");
+    const auto* type = gltf_member(accessor, "type");
     if (!type || !type->is_string()) return 0;
     const auto& name = type->get_ref<const std::string&>();
     if (name == "SCALAR") return 1;
@@ -121,7 +119,7 @@ Result<GltfView> rows_in(GltfFile& file, std::uint64_t accessor, std::uint64_t v
 Result<void> add_sparse(GltfFile& file, std::uint64_t index, const json& sparse, std::size_t row, GltfAccessor& out) {
     const auto count = gltf_number(sparse, "count", 0);
     if (!count) return tl::unexpected(count.error());
-    const auto *indices = find_member(sparse, "indices"), *values = find_member(sparse, "values");
+    const auto *indices = gltf_member(sparse, "indices"), *values = gltf_member(sparse, "values");
     if (*count == 0) return {};
     if (!indices || !values) return not_readable(index, "is sparse without indices or values");
     const auto component = gltf_number(*indices, "componentType", 0);
@@ -192,7 +190,7 @@ Result<GltfAccessor> open_accessor(GltfFile& file, std::uint64_t index) {
     if (row == 0) return not_readable(index, "is of a type that is not read here");
     out.component = static_cast<GltfComponent>(*component);
     out.count = *count;
-    const auto* normalised = find_member(json_of, "normalized");
+    const auto* normalised = gltf_member(json_of, "normalized");
     out.normalised = normalised && normalised->is_boolean() && normalised->get<bool>();
     if (*view_index) {
         const auto rows = rows_in(file, index, **view_index, *offset, out.count, row);
@@ -200,7 +198,7 @@ Result<GltfAccessor> open_accessor(GltfFile& file, std::uint64_t index) {
         out.bytes = rows->bytes;
         out.stride = static_cast<std::size_t>(*rows->stride);
     }
-    const auto* sparse = find_member(json_of, "sparse");
+    const auto* sparse = gltf_member(json_of, "sparse");
     if (sparse)
         if (auto ok = add_sparse(file, index, *sparse, row, out); !ok) return tl::unexpected(ok.error());
     return out;

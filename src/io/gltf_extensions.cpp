@@ -3,7 +3,6 @@
 #include <string_view>
 
 #include "io/gltf_file.h"
-#include "io/skeleton_json_value.h"
 
 namespace htvm::internal {
 namespace {
@@ -53,7 +52,7 @@ bool is_known(std::string_view name) {
 
 std::vector<std::string> names_in(const json& root, const char* list) {
     std::vector<std::string> out;
-    const auto* names = find_member(root, list);
+    const auto* names = gltf_member(root, list);
     if (!names || !names->is_array()) return out;
     for (const auto& name : *names) out.push_back(name.is_string() ? name.get<std::string>() : std::string());
     return out;
@@ -74,8 +73,8 @@ Result<void> check_gltf_extensions(const json& root, MeshFindings* findings) {
 }
 
 const json* gltf_extension(const json& object, const char* name) {
-    const auto* extensions = find_member(object, "extensions");
-    const auto* extension = extensions ? find_member(*extensions, name) : nullptr;
+    const auto* extensions = gltf_member(object, "extensions");
+    const auto* extension = extensions ? gltf_member(*extensions, name) : nullptr;
     return extension && extension->is_object() ? extension : nullptr;
 }
 

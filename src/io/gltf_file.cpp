@@ -59,10 +59,10 @@ Result<Parts> parts_of_glb(std::span<const std::uint8_t> bytes) {
 
 // "2.1" may be read by those who know 2.0, unless the file says otherwise.
 Result<void> check_version(const json& root) {
-    const auto* asset = find_member(root, "asset");
-    const auto* version = asset ? find_member(*asset, "version") : nullptr;
+    const auto* asset = gltf_member(root, "asset");
+    const auto* version = asset ? gltf_member(*asset, "version") : nullptr;
     if (!version || !version->is_string()) return not_readable("it does not say its version");
-    const auto* least = find_member(*asset, "minVersion");
+    const auto* least = gltf_member(*asset, "minVersion");
     const auto& text = (least && least->is_string() ? least : version)->get_ref<const std::string&>();
     const bool is_read =
         least && least->is_string() ? text == "2.0" || text == "2" : text.starts_with("2.") || text == "2";
@@ -109,7 +109,7 @@ Result<std::span<const std::uint8_t>> open_buffer(GltfFile& file, std::uint64_t 
     const auto length = gltf_number(**buffer, "byteLength", 0);
     if (!length) return tl::unexpected(length.error());
     std::span<const std::uint8_t> content;
-    const auto* uri = find_member(**buffer, "uri");
+    const auto* uri = gltf_member(**buffer, "uri");
     if (!uri) {
         if (index > 0) return not_readable("buffer " + std::to_string(index) + " has no URI");
         content = file.binary;
@@ -133,10 +133,10 @@ Result<std::span<const std::uint8_t>> open_buffer(GltfFile& file, std::uint64_t 
 bool is_plain_left_out(const json& buffer, bool is_binary_chunk) {
     for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"})
         if (const auto* extension = gltf_extension(buffer, name)) {
-            const auto* fallback = find_member(*extension, "fallback");
+            const auto* fallback = gltf_member(*extension, "fallback");
             if (fallback && fallback->is_boolean() && fallback->get<bool>()) return true;
         }
-    return !find_member(buffer, "uri") && !is_binary_chunk;
+    return !gltf_member(buffer, "uri") && !is_binary_chunk;
 }
 
 Result<void> check_compression(const GltfFile& file, const json& view, std::uint64_t buffer_index) {
@@ -166,6 +166,12 @@ tl::unexpected<Error> gltf_not_readable(const std::string& why) {
     return fail(ErrorKind::bad_input, "the glTF cannot be read: " + why);
 }
 
+const json* gltf_member(const json& object, const char* name) {
+    if (!object.is_object()) return nullptr;
+    const auto found = object.find(name);
+    return found == object.end() || found->is_null() ? nullptr : &*found;
+}
+
 Result<GltfFile> open_gltf(std::span<const std::uint8_t> bytes, const fs::path& folder) {
     Parts parts{{reinterpret_cast<const char*>(bytes.data()), bytes.size()}, {}};
     if (ByteReader(bytes).u32() == glb_magic) {
@@ -182,7 +188,7 @@ Result<GltfFile> open_gltf(std::span<const std::uint8_t> bytes, const fs::path& 
 }
 
 Result<const json*> gltf_item(const GltfFile& file, const char* list, std::uint64_t index) {
-    const auto* items = find_member(file.root, list);
+    const auto* items = gltf_member(file.root, list);
     if (!items || !items->is_array() || index >= items->size() ||
         !(*items)[static_cast<std::size_t>(index)].is_object())
         return not_readable("it refers to number " + std::to_string(index) + " of its " + list +
@@ -191,7 +197,7 @@ Result<const json*> gltf_item(const GltfFile& file, const char* list, std::uint6
 }
 
 Result<std::uint64_t> gltf_number(const json& object, const char* name, std::uint64_t otherwise) {
-    const auto* member = find_member(object, name);
+    const auto* member = gltf_member(object, name);
     if (!member) return otherwise;
     if (!member->is_number_unsigned())
         return not_readable(std::string("a \"") + name + "\" is no whole number from 0 on");
@@ -199,7 +205,7 @@ Result<std::uint64_t> gltf_number(const json& object, const char* name, std::uin
 }
 
 Result<std::optional<std::uint64_t>> gltf_index(const json& object, const char* name) {
-    if (!find_member(object, name)) return std::optional<std::uint64_t>();
+    if (!gltf_member(object, name)) return std::optional<std::uint64_t>();
     const auto number = gltf_number(object, name, 0);
     if (!number) return tl::unexpected(number.error());
     return std::optional(*number);
@@ -208,7 +214,7 @@ Result<std::optional<std::uint64_t>> gltf_index(const json& object, const char* 
 template <std::size_t N>
 Result<std::array<double, N>> gltf_numbers(const json& object, const char* name,
                                            const std::array<double, N>& otherwise) {
-    const auto* member = find_member(object, name);
+    const auto* member = gltf_member(object, name);
     if (!member) return otherwise;
     std::array<double, N> out{};
     bool fits = member->is_array() && member->size() == N;
@@ -227,7 +233,7 @@ template Result<std::array<double, 4>> gltf_numbers(const json&, const char*, co
 template Result<std::array<double, 16>> gltf_numbers(const json&, const char*, const std::array<double, 16>&);
 
 Result<double> gltf_real(const json& object, const char* name, double otherwise) {
-    const auto* member = find_member(object, name);
+    const auto* member = gltf_member(object, name);
     if (!member) return otherwise;
     const auto number = finite_number(*member);
     if (!number) return not_readable(std::string("a \"") + name + "\" is no number");
@@ -257,7 +263,7 @@ Result<TextureReference::Image> gltf_image_at(GltfFile& file, std::uint64_t inde
     if (!image) return tl::unexpected(image.error());
     TextureReference::Image out;
     out.name = "image " + std::to_string(index) + " of the glTF";
-    if (const auto* uri = find_member(**image, "uri")) {
+    if (const auto* uri = gltf_member(**image, "uri")) {
         if (!uri->is_string()) return not_readable("the URI of an image is no text");
         const auto& text = uri->get_ref<const std::string&>();
         if (!is_data_uri(text)) {

@@ -36,6 +36,9 @@ Result<GltfFile> open_gltf(std::span<const std::uint8_t> bytes, const std::files
 // Fails (unsupported) if the file requires an extension that is not read; tells of used ones that are not known here.
 Result<void> check_gltf_extensions(const nlohmann::json& root, MeshFindings* findings);
 
+// The member of exactly that name, as "_COLOR_0" is not COLOR_0; nullptr if it is not there or null.
+const nlohmann::json* gltf_member(const nlohmann::json& object, const char* name);
+
 // The object of an extension, nullptr if there is none.
 const nlohmann::json* gltf_extension(const nlohmann::json& object, const char* name);
 

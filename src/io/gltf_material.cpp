@@ -4,8 +4,6 @@
 #include <cmath>
 #include <string>
 
-#include "io/skeleton_json_value.h"
-
 namespace htvm::internal {
 namespace {
 
@@ -89,10 +87,10 @@ Result<Base> base_of(const json& material) {
         if (!from) return Base();
         const auto light = gltf_numbers<4>(*from, factor, white);
         if (!light) return tl::unexpected(light.error());
-        const auto* image = find_member(*from, texture);
-        return Base{image, *light, image || find_member(*from, factor)};
+        const auto* image = gltf_member(*from, texture);
+        return Base{image, *light, image || gltf_member(*from, factor)};
     };
-    const auto metal = part(find_member(material, "pbrMetallicRoughness"), "baseColorTexture", "baseColorFactor");
+    const auto metal = part(gltf_member(material, "pbrMetallicRoughness"), "baseColorTexture", "baseColorFactor");
     const auto gloss =
         part(gltf_extension(material, "KHR_materials_pbrSpecularGlossiness"), "diffuseTexture", "diffuseFactor");
     if (!metal) return metal;
@@ -114,7 +112,7 @@ Result<Emission> emission_of(const json& material) {
         if (!strength) return tl::unexpected(strength.error());
         for (auto& c : *factor) c *= *strength;
     }
-    return Emission{is_black(*factor) ? nullptr : find_member(material, "emissiveTexture"), *factor};
+    return Emission{is_black(*factor) ? nullptr : gltf_member(material, "emissiveTexture"), *factor};
 }
 
 // Whether the base colour or the emission is what is seen.
@@ -125,7 +123,7 @@ bool is_seen_by_emission(const Base& base, const Emission& emission, const json&
 }
 
 Result<void> add_alpha(const json& material, double alpha, GltfLook& look) {
-    const auto* mode = find_member(material, "alphaMode");
+    const auto* mode = gltf_member(material, "alphaMode");
     const bool is_mask = mode && *mode == "MASK", is_blend = mode && *mode == "BLEND";
     const auto cutoff = gltf_real(material, "alphaCutoff", 0.5);
     if (!cutoff) return tl::unexpected(cutoff.error());
@@ -148,8 +146,8 @@ Result<GltfLook> gltf_look(const GltfFile& file, const json& primitive, MeshFind
     if (!base) return tl::unexpected(base.error());
     const auto emission = emission_of(**material);
     if (!emission) return tl::unexpected(emission.error());
-    const auto* attributes = find_member(primitive, "attributes");
-    const bool any_colours = attributes && find_member(*attributes, "COLOR_0");
+    const auto* attributes = gltf_member(primitive, "attributes");
+    const bool any_colours = attributes && gltf_member(*attributes, "COLOR_0");
     if (is_seen_by_emission(*base, *emission, **material, any_colours)) {
         look.factor = emission->factor;
         look.takes_vertex_colours = false;

@@ -17,7 +17,6 @@
 #include "io/gltf_file.h"
 #include "io/gltf_material.h"
 #include "io/gltf_scene.h"
-#include "io/skeleton_json_value.h"
 
 namespace htvm {
 
@@ -35,7 +34,7 @@ enum class Mode : std::uint64_t { points = 0, lines = 1, line_strip = 3, triangl
 
 // A primitive that is shown.
 struct Drawn {
-    const json* primitive;
+    const json *primitive, *attributes;
     const GltfTransform* transform;
     std::size_t node;  // which of the shown meshes it is of
     Mode mode;
@@ -109,7 +108,7 @@ Result<GltfAccessor> decoded_attribute(Reading& reading, std::uint64_t view, con
     if (source.accessor) {
         const auto accessor = gltf_item(reading.file, "accessors", *source.accessor);
         if (!accessor) return tl::unexpected(accessor.error());
-        const auto* normalised = find_member(**accessor, "normalized");
+        const auto* normalised = gltf_member(**accessor, "normalized");
         out.normalised = normalised && normalised->is_boolean() && normalised->get<bool>();
     }
     const bool is_signed = attribute->most == 127 || attribute->most == 32767;
@@ -317,7 +316,6 @@ Result<void> add_decoded_triangles(Reading& reading, const DracoGeometry& geomet
 // ---- Primitives -----------------------------------------------------------------------------------------------------
 
 Result<VertexSource> source_of(const Drawn& drawn, bool any_image) {
-    const auto& attributes = (*drawn.primitive)["attributes"];
     VertexSource out;
     out.node = drawn.node;
     out.placed = drawn.look.placed;
@@ -329,13 +327,13 @@ Result<VertexSource> source_of(const Drawn& drawn, bool any_image) {
         if (!view) return tl::unexpected(view.error());
         if (!*view) return not_readable("a primitive has no Draco data");
         out.draco_view = *view;
-        decoded = find_member(*draco, "attributes");
+        decoded = gltf_member(*draco, "attributes");
     }
     const auto texcoord = "TEXCOORD_" + std::to_string(drawn.look.texcoord_set);
     const auto named = {std::pair{"POSITION", &out.positions}, std::pair{"NORMAL", &out.normals},
                         std::pair{"COLOR_0", &out.colours}, std::pair{texcoord.c_str(), &out.texcoords}};
     for (const auto& [name, source] : named) {
-        const auto index = gltf_index(attributes, name);
+        const auto index = gltf_index(*drawn.attributes, name);
         const auto id = decoded ? gltf_index(*decoded, name) : std::optional<std::uint64_t>();
         if (!index) return tl::unexpected(index.error());
         if (!id) return tl::unexpected(id.error());
@@ -366,8 +364,8 @@ Result<std::optional<Drawn>> drawn_as(const GltfFile& file, const json& primitiv
     if (!mode) return tl::unexpected(mode.error());
     if (*mode > static_cast<std::uint64_t>(Mode::fan))
         return not_readable("a primitive has the unknown mode " + std::to_string(*mode));
-    const auto* attributes = find_member(primitive, "attributes");
-    if (!attributes || !find_member(*attributes, "POSITION")) return std::optional<Drawn>();
+    const auto* attributes = gltf_member(primitive, "attributes");
+    if (!attributes || !gltf_member(*attributes, "POSITION")) return std::optional<Drawn>();
     if (*mode >= static_cast<std::uint64_t>(Mode::lines) && *mode <= static_cast<std::uint64_t>(Mode::line_strip)) {
         remark(findings, "lines", "it has lines, which are passed over", true);
         return std::optional<Drawn>();
@@ -376,12 +374,12 @@ Result<std::optional<Drawn>> drawn_as(const GltfFile& file, const json& primitiv
     if (!look) return tl::unexpected(look.error());
     if (!look->is_shown) return std::optional<Drawn>();
     const auto texcoord = "TEXCOORD_" + std::to_string(look->texcoord_set);
-    if (look->image && !find_member(*attributes, texcoord.c_str())) {
+    if (look->image && !gltf_member(*attributes, texcoord.c_str())) {
         remark(findings, "no-coordinates",
                "a part of it has an image and no texture coordinates: the image is left out", true);
         look->image.reset();
     }
-    return std::optional(Drawn{&primitive, nullptr, 0, static_cast<Mode>(*mode), *look});
+    return std::optional(Drawn{&primitive, attributes, nullptr, 0, static_cast<Mode>(*mode), *look});
 }
 
 // Everything that is shown. Points beside triangles are not: they would be vertices that nothing uses.
@@ -391,7 +389,7 @@ Result<std::vector<Drawn>> all_drawn(const GltfFile& file, const std::vector<Glt
     for (std::size_t m = 0; m < meshes.size(); ++m) {
         const auto mesh = gltf_item(file, "meshes", meshes[m].mesh);
         if (!mesh) return tl::unexpected(mesh.error());
-        const auto* primitives = find_member(**mesh, "primitives");
+        const auto* primitives = gltf_member(**mesh, "primitives");
         if (!primitives || !primitives->is_array()) continue;
         if (auto ok = check_count(out.size() + primitives->size(), most_drawn, "parts"); !ok)
             return tl::unexpected(ok.error());

@@ -9,7 +9,6 @@
 #include "core/geometry.h"
 #include "io/gltf_accessor.h"
 #include "io/mesh_check.h"
-#include "io/skeleton_json_value.h"
 
 namespace htvm::internal {
 
@@ -64,7 +63,7 @@ GltfTransform of_parts(const Vector3d& move, std::array<double, 4> turn, const V
 
 // The node's own, relative to its parent.
 Result<GltfTransform> transform_of(const json& node) {
-    if (find_member(node, "matrix")) {
+    if (gltf_member(node, "matrix")) {
         const auto m = gltf_numbers<16>(node, "matrix", {});
         if (!m) return tl::unexpected(m.error());
         return of_matrix(*m);
@@ -83,7 +82,7 @@ Result<GltfTransform> transform_of(const json& node) {
 // The numbers in a list of nodes, such as children.
 Result<std::vector<std::uint64_t>> nodes_in(const json& object, const char* name) {
     std::vector<std::uint64_t> out;
-    const auto* list = find_member(object, name);
+    const auto* list = gltf_member(object, name);
     if (!list) return out;
     if (!list->is_array()) return not_readable(std::string("\"") + name + "\" is no list");
     for (const auto& node : *list) {
@@ -95,7 +94,7 @@ Result<std::vector<std::uint64_t>> nodes_in(const json& object, const char* name
 }
 
 std::size_t count_in(const GltfFile& file, const char* list) {
-    const auto* items = find_member(file.root, list);
+    const auto* items = gltf_member(file.root, list);
     return items && items->is_array() ? items->size() : 0;
 }
 
@@ -104,7 +103,9 @@ Result<std::vector<std::uint64_t>> top_nodes(const GltfFile& file) {
     const std::size_t count = count_in(file, "nodes");
     std::vector<bool> is_child(count);
     for (std::size_t n = 0; n < count; ++n) {
-        const auto children = nodes_in(file.root["nodes"][n], "children");
+        const auto node = gltf_item(file, "nodes", n);
+        if (!node) return tl::unexpected(node.error());
+        const auto children = nodes_in(**node, "children");
         if (!children) return tl::unexpected(children.error());
         for (const auto child : *children)
             if (child < count) is_child[static_cast<std::size_t>(child)] = true;
@@ -253,7 +254,7 @@ Result<GltfTransform> transform_by_skin(GltfFile& file, std::uint64_t skin, std:
 
 bool is_hidden(const json& node) {
     const auto* extension = gltf_extension(node, "KHR_node_visibility");
-    const auto* visible = extension ? find_member(*extension, "visible") : nullptr;
+    const auto* visible = extension ? gltf_member(*extension, "visible") : nullptr;
     return visible && visible->is_boolean() && !visible->get<bool>();
 }
 
@@ -261,7 +262,7 @@ bool is_hidden(const json& node) {
 Result<std::vector<GltfTransform>> instances_of(GltfFile& file, const json& node) {
     const auto* extension = gltf_extension(node, "EXT_mesh_gpu_instancing");
     if (!extension) return std::vector<GltfTransform>(1);
-    const auto* attributes = find_member(*extension, "attributes");
+    const auto* attributes = gltf_member(*extension, "attributes");
     std::array<std::optional<GltfAccessor>, 3> rows;
     constexpr std::array names = {"TRANSLATION", "ROTATION", "SCALE"};
     std::optional<std::uint64_t> count;
@@ -291,7 +292,7 @@ Result<std::vector<GltfTransform>> instances_of(GltfFile& file, const json& node
 }
 
 bool any_weight(const json& object) {
-    const auto* weights = find_member(object, "weights");
+    const auto* weights = gltf_member(object, "weights");
     if (!weights || !weights->is_array()) return false;
     return std::any_of(weights->begin(), weights->end(),
                        [](const json& weight) { return !weight.is_number() || weight.get<double>() != 0; });
@@ -300,7 +301,7 @@ bool any_weight(const json& object) {
 Result<void> check_shape(const GltfFile& file, const json& node, std::uint64_t index) {
     const auto mesh = gltf_item(file, "meshes", index);
     if (!mesh) return tl::unexpected(mesh.error());
-    if (find_member(node, "weights") ? any_weight(node) : any_weight(**mesh))
+    if (gltf_member(node, "weights") ? any_weight(node) : any_weight(**mesh))
         return fail(ErrorKind::unsupported,
                     "the glTF has a mesh that morph targets change, which are not read; export "
                     "it with the shape applied");
@@ -308,7 +309,7 @@ Result<void> check_shape(const GltfFile& file, const json& node, std::uint64_t i
 }
 
 void tell_of_animations(const GltfFile& file, MeshFindings* findings) {
-    const auto* animations = find_member(file.root, "animations");
+    const auto* animations = gltf_member(file.root, "animations");
     if (!animations || !animations->is_array() || animations->empty()) return;
     remark(findings, "animation", "it is animated, and taken as it is at rest");
 }

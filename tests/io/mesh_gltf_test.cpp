@@ -353,6 +353,17 @@ TEST(GltfReading, AttributesMayHaveRowsThatNoVertexUses) {
     EXPECT_THAT(sample.error().message, HasSubstr("3 of 4 vertices"));
 }
 
+TEST(GltfReading, AttributesOfAProgramsOwnAreNotLookedAt) {
+    Sample sample;
+    sample.add("_COLOR_0", floats({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}), 5126, "VEC3");
+    sample.add("color_0", floats({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}), 5126, "VEC3");
+    EXPECT_TRUE(sample.mesh().colours.empty());
+    auto& attributes = sample.primitive()["attributes"];
+    attributes["_POSITION"] = attributes["POSITION"];
+    attributes.erase("POSITION");
+    EXPECT_TRUE(sample.mesh().positions.empty());
+}
+
 TEST(GltfReading, TheLargestIndexBeginsStripsAnew) {
     Sample sample;
     sample.primitive()["indices"] = sample.add_accessor({0, 1, 2, 255, 1, 2, 3, 0}, 5121, "SCALAR", 8);
