@@ -36,59 +36,90 @@ std::vector<Triangle> at_places(std::span<const LatticePoint> positions, std::sp
 
 bool is_collapsed(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-// Which triangles have the corners of one before them.
-std::vector<bool> find_doubled(const std::vector<Triangle>& triangles) {
-    struct Corners {
-        Triangle sorted;
-        std::uint32_t triangle;
-    };
-    std::vector<Corners> all;
-    all.reserve(triangles.size());
-    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-        auto sorted = triangles[t];
-        std::sort(sorted.begin(), sorted.end());
-        if (!is_collapsed(triangles[t])) all.push_back({sorted, t});
+// Numbers 0, 1, ... in groups of the same place: sorting within these few takes a fraction of sorting all.
+struct Groups {
+    std::vector<std::uint32_t> begin;  // of each place's group in `members`, and the end
+    std::vector<std::uint32_t> members;
+    std::span<std::uint32_t> of(std::size_t place) {
+        return std::span(members).subspan(begin[place], begin[place + 1] - begin[place]);
     }
-    std::sort(all.begin(), all.end(), [](const Corners& a, const Corners& b) {
-        return std::tie(a.sorted, a.triangle) < std::tie(b.sorted, b.triangle);
-    });
-    std::vector<bool> out(triangles.size());
-    for (std::size_t i = 1; i < all.size(); ++i) out[all[i].triangle] = all[i].sorted == all[i - 1].sorted;
+};
+
+Groups grouped(const std::vector<std::uint32_t>& place_of, std::size_t places) {
+    Groups out{std::vector<std::uint32_t>(places + 1), std::vector<std::uint32_t>(place_of.size())};
+    for (const auto place : place_of) ++out.begin[place + 1];
+    for (std::size_t p = 0; p < places; ++p) out.begin[p + 1] += out.begin[p];
+    auto next = out.begin;
+    for (std::uint32_t i = 0; i < place_of.size(); ++i) out.members[next[place_of[i]]++] = i;
     return out;
 }
 
-// A neighbour across an edge; of like winding the two go along it in opposite directions.
-struct Neighbour {
-    std::uint32_t triangle;
-    bool wound_alike;
+// Which triangles have the corners of one before them.
+std::vector<bool> find_doubled(const std::vector<Triangle>& triangles, std::size_t places) {
+    std::vector<Triangle> sorted = triangles;
+    std::vector<std::uint32_t> smallest;
+    smallest.reserve(triangles.size());
+    for (auto& t : sorted) {
+        std::sort(t.begin(), t.end());
+        smallest.push_back(t[0]);
+    }
+    auto groups = grouped(smallest, places);
+    std::vector<bool> out(triangles.size());
+    for (std::size_t place = 0; place < places; ++place) {
+        const auto group = groups.of(place);
+        std::sort(group.begin(), group.end(), [&](std::uint32_t a, std::uint32_t b) {
+            return std::tie(sorted[a], a) < std::tie(sorted[b], b);
+        });
+        for (std::size_t i = 1; i < group.size(); ++i)
+            out[group[i]] = sorted[group[i]] == sorted[group[i - 1]] && !is_collapsed(sorted[group[i]]);
+    }
+    return out;
+}
+
+// Neighbours across edges; of like winding two triangles go along theirs in opposite directions.
+struct Neighbours {
+    struct One {
+        std::uint32_t triangle;
+        bool wound_alike;
+    };
+    std::array<One, 3> all{};
+    std::uint8_t count = 0;
 };
 
 // Across each of a triangle's edges that exactly two triangles share.
-std::vector<std::vector<Neighbour>> find_neighbours(const std::vector<Triangle>& triangles,
-                                                    const std::vector<bool>& left_out) {
+std::vector<Neighbours> find_neighbours(const std::vector<Triangle>& triangles, const std::vector<bool>& left_out,
+                                        std::size_t places) {
     struct Edge {
-        std::uint32_t low, high, triangle;
+        std::uint32_t high, triangle;
         bool upwards;
     };
     std::vector<Edge> edges;
+    std::vector<std::uint32_t> low;
     edges.reserve(3 * triangles.size());
+    low.reserve(3 * triangles.size());
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
         if (left_out[t] || is_collapsed(triangles[t])) continue;
         for (std::size_t i = 0; i < 3; ++i) {
             const auto from = triangles[t][i], to = triangles[t][(i + 1) % 3];
-            edges.push_back({std::min(from, to), std::max(from, to), t, from < to});
+            low.push_back(std::min(from, to));
+            edges.push_back({std::max(from, to), t, from < to});
         }
     }
-    std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
-        return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-    });
-    std::vector<std::vector<Neighbour>> out(triangles.size());
-    for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
-        while (end < edges.size() && edges[end].low == edges[begin].low && edges[end].high == edges[begin].high) ++end;
-        if (end - begin != 2) continue;
-        const auto &a = edges[begin], &b = edges[begin + 1];
-        out[a.triangle].push_back({b.triangle, a.upwards != b.upwards});
-        out[b.triangle].push_back({a.triangle, a.upwards != b.upwards});
+    auto groups = grouped(low, places);
+    std::vector<Neighbours> out(triangles.size());
+    for (std::size_t place = 0; place < places; ++place) {
+        const auto group = groups.of(place);
+        std::sort(group.begin(), group.end(), [&](std::uint32_t a, std::uint32_t b) {
+            return std::tie(edges[a].high, a) < std::tie(edges[b].high, b);
+        });
+        for (std::size_t begin = 0, end = 0; begin < group.size(); begin = end) {
+            while (end < group.size() && edges[group[end]].high == edges[group[begin]].high) ++end;
+            if (end - begin != 2) continue;
+            const auto &a = edges[group[begin]], &b = edges[group[begin + 1]];
+            auto &of_a = out[a.triangle], &of_b = out[b.triangle];
+            of_a.all[of_a.count++] = {b.triangle, a.upwards != b.upwards};
+            of_b.all[of_b.count++] = {a.triangle, a.upwards != b.upwards};
+        }
     }
     return out;
 }
@@ -133,8 +164,8 @@ bool faces_wrongly(const Piece& piece, std::span<const LatticePoint> positions, 
 
 CleanedTriangles clean_triangles(std::span<const LatticePoint> positions, std::span<const Triangle> triangles) {
     const auto places = at_places(positions, triangles);
-    const auto doubled = find_doubled(places);
-    const auto neighbours = find_neighbours(places, doubled);
+    const auto doubled = find_doubled(places, positions.size());
+    const auto neighbours = find_neighbours(places, doubled, positions.size());
     // Where sides were doubled, the first of each pair says nothing of which way the surface faces.
     const bool any_doubled = std::find(doubled.begin(), doubled.end(), true) != doubled.end();
     std::vector<bool> met(triangles.size()), turned(triangles.size());
@@ -144,7 +175,7 @@ CleanedTriangles clean_triangles(std::span<const LatticePoint> positions, std::s
         met[first] = true;
         for (std::size_t at = 0; at < piece.triangles.size(); ++at) {
             const auto t = piece.triangles[at];
-            for (const auto& [other, wound_alike] : neighbours[t]) {
+            for (const auto& [other, wound_alike] : std::span(neighbours[t].all).first(neighbours[t].count)) {
                 if (met[other]) continue;
                 met[other] = true;
                 turned[other] = turned[t] == wound_alike;
