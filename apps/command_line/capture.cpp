@@ -499,9 +499,10 @@ Result<void> Capture::read_first_again() {
             "the colours at vertices, which multiply those of the images, are left out of the pictures; --texture-as "
             "colours has both");
     if (const double step = step_of_floats(peeked_->mesh, shift_, millimetres_per_unit_); step > coarse_step)
-        warn(fmt::format("the files hold floats, which are exact to {} there: where they are written, take the distance "
-                         "off first, or write doubles",
-                         length_text(step)));
+        warn(
+            fmt::format("the files hold floats, which are exact to {} there: where they are written, take the distance "
+                        "off first, or write doubles",
+                        length_text(step)));
     tell(textures_.findings().remarks, pipe_ ? name() : files_.paths[peeked_at_].string());
     has_texture_ = peeked_->texture != nullptr;
     find_floor();

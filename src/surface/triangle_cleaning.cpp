@@ -67,9 +67,8 @@ std::vector<bool> find_doubled(const std::vector<Triangle>& triangles, std::size
     std::vector<bool> out(triangles.size());
     for (std::size_t place = 0; place < places; ++place) {
         const auto group = groups.of(place);
-        std::sort(group.begin(), group.end(), [&](std::uint32_t a, std::uint32_t b) {
-            return std::tie(sorted[a], a) < std::tie(sorted[b], b);
-        });
+        std::sort(group.begin(), group.end(),
+                  [&](std::uint32_t a, std::uint32_t b) { return std::tie(sorted[a], a) < std::tie(sorted[b], b); });
         for (std::size_t i = 1; i < group.size(); ++i)
             out[group[i]] = sorted[group[i]] == sorted[group[i - 1]] && !is_collapsed(sorted[group[i]]);
     }

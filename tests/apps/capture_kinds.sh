@@ -39,7 +39,7 @@ expect 0 "mesh 2 of standard input: it has no colours" bash -c "cat fading/*.ply
 
 # The second half is in another unit.
 change mixed 'v = [[c / 1000 for c in row[:3]] + row[3:] for row in v] if k > 2 else v'
-expect 1 "times smaller than the first frame: of another capture, or in another unit" \
+expect 1 "times smaller than the first frame: one of the two is of another capture, or in another unit" \
     "$htvm" encode mixed -o x.htvm
 
 # Far from the origin, as surveys are: what decode writes is where the capture is, to the lattice's step.
