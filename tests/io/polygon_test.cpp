@@ -70,7 +70,7 @@ TEST(Polygon, AnLIsCutWithinItselfWhereverItBegins) {
     for (const bool is_turned : {false, true}) {
         for (std::size_t first = 0; first < l.size(); ++first) {
             auto corners = l;
-            std::ranges::rotate(corners, corners.begin() + static_cast<std::ptrdiff_t>(first));
+            std::rotate(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(first), corners.end());
             if (is_turned) std::ranges::reverse(corners);
             const auto [with_sign, without] = areas_of(cut(corners));
             EXPECT_NEAR(with_sign, is_turned ? -1.92 : 1.92, 1e-6) << first;
