@@ -87,7 +87,7 @@ TEST(GltfScene, WhatIsNotTakenIsTold) {
     Sample sample;
     EXPECT_TRUE(sample.findings().remarks.empty());
     sample.root["scenes"].push_back(json::object());
-    sample.root["animations"] = {json::object()};
+    sample.root["animations"] = json::array({json::object()});
     sample.root["extensionsUsed"] = {"EXT_something_else", "KHR_xmp_json_ld", "KHR_materials_variants"};
     auto& primitives = sample.root["meshes"][0]["primitives"];
     primitives.push_back(primitives[0]);
