@@ -22,7 +22,8 @@ Error error_of(std::span<const std::uint8_t> bytes) {
 }
 
 void append(Bytes& bytes, std::uint32_t value, int count) {
-    for (int i = 0; i < count; ++i) bytes.push_back(i < 4 ? static_cast<std::uint8_t>(value >> (8 * i)) : std::uint8_t{0});
+    for (int i = 0; i < count; ++i)
+        bytes.push_back(i < 4 ? static_cast<std::uint8_t>(value >> (8 * i)) : std::uint8_t{0});
 }
 
 // A header of 40 bytes, what stands behind it (masks or a palette), and the pixels.
