@@ -273,6 +273,8 @@ std::vector<std::string> cells_of(std::string_view line, char separator) {
 Result<void> add(FrameTimes& times, std::string_view number, std::string_view time, const FrameRate& rate) {
     const auto microseconds = parse_time(time, rate);
     if (!microseconds) return tl::unexpected(microseconds.error());
+    // Dates may lie beyond what a number of microseconds is exact to.
+    if (std::abs(static_cast<double>(*microseconds)) > farthest) return no_time(time, "time within some hundred years");
     if (!times.microseconds.empty() && *microseconds <= times.microseconds.back())
         return fail(ErrorKind::bad_input,
                     "the time " + std::string(time) + " is not above the one before; times must ascend");
