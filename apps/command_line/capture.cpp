@@ -421,7 +421,7 @@ Result<void> Capture::find_unit() {
     return {};
 }
 
-// Of meshes far from their origin, which are read anew without it, before their positions become floats.
+// Meshes far from their origin are read anew without it, before their positions become floats.
 Result<void> Capture::take_off_shift() {
     const auto shift = shift_of(peeked_->mesh, millimetres_per_unit_);
     if (shift == GlobalShift{}) return {};

@@ -172,7 +172,7 @@ Result<Report> look_at_all(const Options& options) {
 
 // ---- Judging --------------------------------------------------------------------------------------------------------
 
-// Of the frames that could be read.
+// Values are those of the frames that could be read.
 template <class Value>
 std::vector<double> values_of(const Report& report, Value value) {
     std::vector<double> out;

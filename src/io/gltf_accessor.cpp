@@ -150,7 +150,7 @@ Result<void> add_sparse(GltfFile& file, std::uint64_t index, const json& sparse,
         out.replaced.emplace_back(place, n);
     }
     std::sort(out.replaced.begin(), out.replaced.end());
-    // Of a row that is replaced twice, the first one is found.
+    // A row that is replaced twice is found where it is first.
     const auto same_row = [](const auto& a, const auto& b) { return a.first == b.first; };
     out.replaced.erase(std::unique(out.replaced.begin(), out.replaced.end(), same_row), out.replaced.end());
     return {};

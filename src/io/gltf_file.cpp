@@ -267,7 +267,7 @@ Result<TextureReference::Image> gltf_image_at(GltfFile& file, std::uint64_t inde
         if (!uri->is_string()) return not_readable("the URI of an image is no text");
         const auto& text = uri->get_ref<const std::string&>();
         if (!is_data_uri(text)) {
-            // Of one that leads elsewhere, the last part is looked for.
+            // A name that leads elsewhere is looked for by its last part.
             auto name = name_in_uri(text, file.folder);
             if (!name) name = name_in_uri(text.substr(text.find_last_of("/\\:") + 1), file.folder);
             if (!name) return not_readable("its image \"" + text.substr(0, 100) + "\" has no name that can be read");

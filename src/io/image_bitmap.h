@@ -16,9 +16,9 @@ Result<Image> read_bmp_image(std::span<const std::uint8_t> bytes, int largest_si
 
 // By the mark at its end, or, as older files have none, by a header in which everything is possible.
 bool is_tga(std::span<const std::uint8_t> bytes);
-// Of palettes, colours and greys, of 8, 15, 16, 24 and 32 bits a pixel, as runs or not, from any corner. Unsupported: a
-// file from the bottom without the mark. ImageMagick 6 writes such files of rows from the top, others as they say, and
-// nothing tells them apart.
+// It has palettes, colours or greys, of 8, 15, 16, 24 and 32 bits a pixel, as runs or not, from any corner.
+// Unsupported: a file from the bottom without the mark. ImageMagick 6 writes such files of rows from the top, others as
+// they say, and nothing tells them apart.
 Result<Image> read_tga_image(std::span<const std::uint8_t> bytes, int largest_side);
 
 }  // namespace htvm::internal

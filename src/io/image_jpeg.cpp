@@ -21,7 +21,7 @@ using TurboJpeg = std::unique_ptr<void, Destroy>;
 
 bool says(std::string_view message, std::string_view part) { return message.find(part) != message.npos; }
 
-// Of the first warning, which is the one that is told.
+// The first warning is the one that is told.
 bool is_harmless(std::string_view warning) {
     return says(warning, "extraneous bytes") || says(warning, "JFIF") || says(warning, "Adobe");
 }
@@ -33,7 +33,7 @@ bool has_end_marker(std::span<const std::uint8_t> bytes) {
     return std::search(last_scan, bytes.end(), end_marker.begin(), end_marker.end()) != bytes.end();
 }
 
-// Of four inks, light: Adobe's programs, and with them all others, store how much of each is missing.
+// Four inks become light: Adobe's programs, and with them all others, store how much of each is missing.
 std::vector<std::uint8_t> light_of_inks(const std::vector<std::uint8_t>& inks) {
     std::vector<std::uint8_t> out(inks.size() / 4 * 3);
     for (std::size_t p = 0; 4 * p < inks.size(); ++p)

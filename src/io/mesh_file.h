@@ -76,7 +76,7 @@ constexpr double millimetres_per(LengthUnit unit) { return names_of(unit).millim
 // bad_input names the symbols that there are.
 Result<LengthUnit> length_unit(std::string_view symbol);
 
-// Of the vertices that triangles use; of all where there are no triangles. Scanners leave unused ones at the origin.
+// The box of the vertices that triangles use; of all where there are none. Scanners leave unused ones at the origin.
 std::optional<SpaceBounds> surface_bounds(const Mesh& mesh);
 
 // The unit that a mesh of a person is probably in, by the diagonal of its surface's bounding box: metres below 10,

@@ -19,7 +19,7 @@ namespace htvm {
 
 struct MeshReadOptions {
     MeshLimits limits;  // the largest mesh to accept
-    // Of colours whose type does not say it (floats, integers of more than 8 bits); nothing: by this mesh alone.
+    // The range of colours whose type does not say it (floats, more than 8 bits); nothing: by this mesh alone.
     std::optional<ColourRange> colour_range = {};
     std::array<double, 3> origin{};  // taken off the positions, as doubles, before they become floats; the file's unit
 };

@@ -290,7 +290,7 @@ std::optional<std::string> name_in_all(const std::vector<FolderOfMeshes>& folder
     return out;
 }
 
-// Of a folder without meshes; nothing if its folders have none either.
+// The frames of a folder without meshes; nothing if its folders have none either.
 Result<std::optional<SequenceFiles>> sequence_of_folders(const fs::path& parent, const SequenceOptions& options) {
     const auto names = names_in(parent, true, options);
     if (!names) return tl::unexpected(names.error());

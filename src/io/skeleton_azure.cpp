@@ -281,7 +281,7 @@ std::vector<double> seconds_of(const std::vector<std::optional<double>>& stamps,
     return out;
 }
 
-// Of frames that do not say when they were taken.
+// Frames that do not say when they were taken are counted.
 void number_frames(const json& frames, SkeletonTrack& track) {
     track.notes.push_back("The file lacks timestamps: taken as 30 fps, or as the meshes.");
     track.rate_is_known = false;

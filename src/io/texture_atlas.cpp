@@ -23,7 +23,7 @@ struct Shift {
     bool operator==(const Shift&) const = default;
 };
 
-// Of one axis of a triangle: what its corners are moved by, and over how many repetitions they then reach.
+// One axis of a triangle: what its corners are moved by, and over how many repetitions they then reach.
 struct AxisMoves {
     std::array<std::int64_t, 3> shifts{};
     int repeats = 1;

@@ -156,7 +156,7 @@ TEST(ImageFile, TheGammaOfAPngIsAppliedUnlessItIsThatOfSrgb) {
 }
 
 TEST(ImageFile, PalettesBecomeTheirColours) {
-    // Of two colours, which libpng writes with one bit a pixel.
+    // It has two colours, which libpng writes with one bit a pixel.
     const std::vector<std::uint8_t> colours{9, 8, 7, 200, 100, 50}, indices{0, 1, 1, 0};
     png_image png{};
     png.version = PNG_IMAGE_VERSION;

@@ -18,7 +18,7 @@ ObjMaterial only(const std::string& text) {
 TEST(ObjMaterials, NamesHoldBlanksAndSigns) {
     EXPECT_EQ(only("newmtl  skin of #3 \t").name, "skin of #3");
     EXPECT_EQ(only("newmtl a\nmap_Kd te x #2.png ").image, "te x #2.png");
-    EXPECT_EQ(only("\tnewmtl\ta\n\t\tmap_Kd\tC:\\work\\t.jpg").image, "C:/work/t.jpg");
+    EXPECT_EQ(only("\tnewmtl\ta\n\t\tmap_Kd\tC:\\scans\\t.jpg").image, "C:/scans/t.jpg");
 }
 
 TEST(ObjMaterials, LinesEndInAnyWay) {
