@@ -18,6 +18,7 @@
 #include "command_line/headings.h"
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
+#include "core/letter_case.h"
 #include "htvm/decoder.hpp"
 #include "io/mesh_file.h"
 #include "live/client/hub_address.h"
@@ -126,9 +127,7 @@ namespace {
 // a file of that kind.
 std::string other_kind_of(const std::filesystem::path& path) {
     if (is_mesh_file_name(path)) return "a mesh";
-    std::string ending = path.extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    const auto ending = internal::lower_case(path.extension().string());
     const auto is_of = [&](std::initializer_list<const char*> endings) {
         return std::find(endings.begin(), endings.end(), ending) != endings.end();
     };

@@ -3,22 +3,23 @@
 #include <algorithm>
 #include <system_error>
 
+#include "core/letter_case.h"
+
 namespace htvm::internal {
 namespace {
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-bool is_letter(char c) { return lower(c) >= 'a' && lower(c) <= 'z'; }
+bool is_letter(char c) { return lower_case(c) >= 'a' && lower_case(c) <= 'z'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 bool begins_with(std::string_view text, std::string_view begin) {
     return text.size() >= begin.size() &&
-           std::equal(begin.begin(), begin.end(), text.begin(), [](char a, char b) { return a == lower(b); });
+           std::equal(begin.begin(), begin.end(), text.begin(), [](char a, char b) { return a == lower_case(b); });
 }
 
 // -1: no digit of a hexadecimal number.
 int hex_digit(char c) {
     if (is_digit(c)) return c - '0';
-    const char small = lower(c);
+    const char small = lower_case(c);
     return small >= 'a' && small <= 'f' ? small - 'a' + 10 : -1;
 }
 
@@ -79,7 +80,7 @@ std::optional<std::vector<std::uint8_t>> content_of_data_uri(std::string_view ur
     const auto comma = uri.find(',');
     if (!is_data_uri(uri) || comma == uri.npos) return std::nullopt;
     std::string kind(uri.substr(0, comma));
-    std::transform(kind.begin(), kind.end(), kind.begin(), lower);
+    kind = lower_case(kind);
     const auto content = uri.substr(comma + 1);
     const bool is_escaped = content.find('%') != content.npos;
     const auto plain = is_escaped ? without_escapes(content) : std::string();

@@ -6,17 +6,15 @@
 #include <utility>
 #include <vector>
 
+#include "core/letter_case.h"
+
 namespace htvm {
+
+using internal::lower_case;
 
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string lower_case(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-    return text;
-}
 
 std::string trimmed(const std::string& text) {
     constexpr const char* blanks = " \t\r\v\f";

@@ -4,22 +4,17 @@
 #include <array>
 #include <cmath>
 
+#include "core/letter_case.h"
 #include "io/colour_range.h"
 #include "io/number_text.h"
 
 namespace htvm {
 
+using internal::lower_case;
+
 namespace {
 
 constexpr const char* blanks = " \t\v\f";
-
-char lower_case(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
-std::string lower_case(std::string_view text) {
-    std::string out(text);
-    for (char& c : out) c = lower_case(c);
-    return out;
-}
 
 std::string_view trimmed(std::string_view text) {
     const std::size_t begin = text.find_first_not_of(blanks);

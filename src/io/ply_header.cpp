@@ -7,17 +7,14 @@
 #include <span>
 #include <utility>
 
+#include "core/letter_case.h"
 #include "io/number_text.h"
 
 namespace htvm {
 
-namespace {
+using internal::lower_case;
 
-std::string lower_case(std::string_view text) {
-    std::string out(text);
-    for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    return out;
-}
+namespace {
 
 // name: in lower case.
 std::optional<PlyType> type_named(std::string_view name) {

@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/letter_case.h"
 #include "io/drc.h"
 #include "io/recording_manifest.h"
 #include "io/sequence.h"

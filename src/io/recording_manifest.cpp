@@ -7,6 +7,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/letter_case.h"
 #include "io/sequence.h"
 #include "io/skeleton_json_value.h"
 
@@ -134,12 +135,6 @@ Result<void> add_universal_texture(const json& manifest, const fs::path& folder,
 }
 
 }  // namespace
-
-std::string lower_case(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-    return text;
-}
 
 std::optional<fs::path> recorded_file(const fs::path& folder, std::string name) {
     std::replace(name.begin(), name.end(), '\\', '/');

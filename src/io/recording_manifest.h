@@ -19,8 +19,6 @@ MaybeRecording universal_recording(const nlohmann::json& manifest, const std::fi
 MaybeRecording geometry_sequence_recording(const nlohmann::json& manifest, const std::filesystem::path& folder);
 MaybeRecording depthkit_recording(const nlohmann::json& manifest, const std::filesystem::path& folder);
 
-std::string lower_case(std::string text);
-
 // A file of the folder or below it, by the name that a manifest gives: as it is, or without the folders of another
 // machine before it.
 std::optional<std::filesystem::path> recorded_file(const std::filesystem::path& folder, std::string name);

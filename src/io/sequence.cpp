@@ -9,9 +9,12 @@
 #include <system_error>
 #include <utility>
 
+#include "core/letter_case.h"
 #include "io/mesh_file.h"
 
 namespace htvm {
+
+using internal::lower_case;
 
 namespace {
 
@@ -131,12 +134,6 @@ std::vector<std::string> stems_of(const std::vector<Entry>& entries) {
     std::vector<std::string> out;
     for (const auto& entry : entries) out.push_back(entry.stem);
     return out;
-}
-
-std::string lower_case(std::string text) {
-    for (char& c : text)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return text;
 }
 
 std::string format_of(const fs::path& path) { return lower_case(path.extension().string()); }

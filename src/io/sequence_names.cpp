@@ -9,18 +9,15 @@
 #include <set>
 #include <utility>
 
+#include "core/letter_case.h"
+
 namespace htvm {
+
+using internal::lower_case;
 namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-std::string lower(std::string_view text) {
-    std::string out(text);
-    for (char& c : out) c = lower(c);
-    return out;
-}
-
 // ---- Numbers in names -----------------------------------------------------------------------------------------------
 
 struct NumberInName {
@@ -91,7 +88,7 @@ SplitName split(std::string_view name) {
 // The same for names of one kind alone.
 std::string key_of(const SplitName& name) {
     std::string key;
-    for (const auto& text : name.texts) key += std::to_string(text.size()) + ":" + lower(text);
+    for (const auto& text : name.texts) key += std::to_string(text.size()) + ":" + lower_case(text);
     return key;
 }
 
@@ -395,7 +392,7 @@ bool is_text_order(std::span<const std::string> names) {
     for (const auto& name : names) {
         auto& out = collated.emplace_back();
         for (const char c : name)
-            if (is_digit(c) || is_letter(c) || static_cast<unsigned char>(c) >= 0x80) out += lower(c);
+            if (is_digit(c) || is_letter(c) || static_cast<unsigned char>(c) >= 0x80) out += lower_case(c);
     }
     return std::is_sorted(collated.begin(), collated.end());
 }
@@ -486,7 +483,7 @@ std::optional<std::string> original_of_copy(std::string_view name) {
     constexpr std::array behind = {" - copy", "_copy",    "-copy",  " copy",    ".copy",  " - kopie", " kopie",
                                    "_kopie",  " - copia", " copia", " - copie", " copie", "_old",     "_backup",
                                    "_bak",    ".bak",     ".old",   ".orig",    ".backup"};
-    const std::string all = lower(name);
+    const std::string all = lower_case(name);
     for (const std::string_view mark : before)
         if (all.starts_with(mark) && all.size() > mark.size()) return std::string(name.substr(mark.size()));
     // A number behind the mark, "(2)" or "2", and "(2)" without a mark.
@@ -506,7 +503,7 @@ std::optional<std::string> original_of_copy(std::string_view name) {
 }
 
 bool is_unfinished_name(std::string_view name) {
-    const std::string all = lower(name);
+    const std::string all = lower_case(name);
     for (const std::string_view ending : {".tmp", ".temp", ".part", ".partial", "_tmp", "~"})
         if (all.ends_with(ending)) return true;
     return all.starts_with("~") || all.find("conflicted copy") != all.npos || all.find(".sync-conflict-") != all.npos;

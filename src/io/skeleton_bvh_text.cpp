@@ -7,16 +7,17 @@
 #include <optional>
 #include <utility>
 
+#include "core/letter_case.h"
 #include "io/skeleton_track.h"
 
 namespace htvm {
+
+using internal::lower_case;
 namespace {
 
 constexpr std::size_t max_channels = 12;  // of one joint
 
 bool is_space(char c) { return static_cast<unsigned char>(c) <= ' '; }
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
 // What commas are in a part of the file.
 enum class Commas { letters, decimal, space };
 
@@ -68,7 +69,8 @@ struct WordReader {
 };
 
 bool same_word(std::string_view a, std::string_view b) {
-    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return lower(x) == lower(y); });
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [](char x, char y) { return lower_case(x) == lower_case(y); });
 }
 
 tl::unexpected<Error> fail_on_line(const WordReader& words, const std::string& message) {
@@ -96,7 +98,7 @@ Result<void> expect_label(WordReader& words, std::string_view label) {
     for (const char expected : label) {
         ahead.skip_space();
         if (expected == ' ') continue;
-        if (ahead.position == ahead.text.size() || lower(ahead.text[ahead.position]) != lower(expected))
+        if (ahead.position == ahead.text.size() || lower_case(ahead.text[ahead.position]) != lower_case(expected))
             return fail_on_line(words, "expected " + std::string(label) + ":, found " + found_instead(words.word()));
         ++ahead.position;
     }

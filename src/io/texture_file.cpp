@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/letter_case.h"
 #include "core/srgb.h"
 #include "io/image_file.h"
 #include "io/recording.h"
@@ -28,12 +29,6 @@ tl::unexpected<Error> fail_at(const fs::path& mesh, ErrorKind kind, const std::s
 }
 
 fs::path folder_of(const fs::path& mesh) { return mesh.has_parent_path() ? mesh.parent_path() : fs::path("."); }
-
-std::string lower_case(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-    return text;
-}
 
 // Adds to the error which files are taken, if the name is not even that of an image.
 Error with_what_is_taken(Error error, const fs::path& path) {

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/letter_case.h"
 #include "io/child_program.h"
 
 namespace htvm {
@@ -133,9 +134,7 @@ private:
 };
 
 bool is_video_file_name(const fs::path& path) {
-    auto extension = path.extension().string();
-    for (char& c : extension)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    const auto extension = internal::lower_case(path.extension().string());
     return std::ranges::find(video_extensions, extension) != std::end(video_extensions);
 }
 
