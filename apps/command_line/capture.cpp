@@ -14,6 +14,7 @@
 #include "io/skeleton_file.h"
 #include "io/skeleton_rate.h"
 #include "io/texture_colours.h"
+#include "metrics/percentile.h"
 
 namespace htvm::app {
 namespace {
@@ -41,9 +42,7 @@ std::string length_text(double millimetres) {
 FrameRate rate_of(const std::vector<std::int64_t>& times) {
     std::vector<std::int64_t> intervals;
     for (std::size_t k = 1; k < times.size(); ++k) intervals.push_back(times[k] - times[k - 1]);
-    const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-    std::nth_element(intervals.begin(), middle, intervals.end());
-    const double per_second = std::clamp(1e6 / static_cast<double>(*middle), 0.001, 1e6);
+    const double per_second = std::clamp(1e6 / static_cast<double>(middle_of(std::move(intervals))), 0.001, 1e6);
     return {static_cast<std::uint32_t>(std::lround(per_second * 1000)), 1000};
 }
 
@@ -446,7 +445,8 @@ void Capture::find_kind() {
     if (!scale_positions(first, millimetres_per_unit_)) return;
     const auto& findings = textures_.findings();
     kind_.add(first, findings, peeked_->texture != nullptr);
-    const std::size_t samples = findings.colour_levels.any() ? 8 : 4;  // besides the first
+    // Others besides the first: those of a texture need neither colours nor their range.
+    const std::size_t samples = findings.colour_levels.any() ? 8 : peeked_->texture ? 0 : 4;
     for (std::size_t k = 1; !pipe_ && k <= samples && frames_ > 1; ++k) {
         const auto place = begin_ + k * (frames_ - 1) / samples;
         if (place == peeked_at_ || (k > 1 && place == begin_ + (k - 1) * (frames_ - 1) / samples)) continue;
@@ -464,17 +464,18 @@ void Capture::find_kind() {
 // The step of floats as far from the origin as the shift is, mm, if the file's coordinates lie on it: it held floats.
 // 0: it did not, or there is no shift. The mesh is without the shift, in mm.
 double step_of_floats(const Mesh& mesh, const GlobalShift& shift, double millimetres_per_unit) {
+    const auto origin = in_units(shift, millimetres_per_unit);
     double step = 0;
     for (std::size_t c = 0; c < 3; ++c) {
-        const auto farthest = static_cast<float>(static_cast<double>(shift[c]) / millimetres_per_unit);
+        const auto farthest = static_cast<float>(origin[c]);
         if (farthest == 0) continue;
         const double of_axis = static_cast<double>(std::nextafter(std::abs(farthest), 3e38f) - std::abs(farthest));
         // Next to a power of two the step changes.
         const double finest = of_axis / 2;
-        const double origin = static_cast<double>(shift[c]) / millimetres_per_unit;
         constexpr std::size_t most = 200;
         for (std::size_t v = 0; v < mesh.positions.size(); v += mesh.positions.size() / most + 1) {
-            const double steps = (static_cast<double>(mesh.positions[v][c]) / millimetres_per_unit + origin) / finest;
+            const double steps =
+                (static_cast<double>(mesh.positions[v][c]) / millimetres_per_unit + origin[c]) / finest;
             if (std::abs(steps - std::round(steps)) > 0.05) return 0;
         }
         step = std::max(step, of_axis * millimetres_per_unit);
@@ -628,7 +629,7 @@ MeshFileOptions Capture::mesh_options() const {
     MeshFileOptions out;
     out.millimetres_per_unit = millimetres_per_unit_;
     out.reading.colour_range = colour_range_;
-    for (std::size_t c = 0; c < 3; ++c) out.reading.origin[c] = static_cast<double>(shift_[c]) / millimetres_per_unit_;
+    out.reading.origin = in_units(shift_, millimetres_per_unit_);
     return out;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "io/mesh_file.h"
+#include "metrics/percentile.h"
 
 namespace htvm::app {
 
@@ -40,11 +41,6 @@ double size_of(const Mesh& mesh) {
     for (std::size_t v = 0; v < mesh.positions.size(); v += step)
         for (std::size_t c = 0; c < 3; ++c) along[c].push_back(mesh.positions[v][c]);
     if (along[0].empty()) return 0;
-    const auto middle_of = [](std::vector<float> values) {
-        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-        std::nth_element(values.begin(), middle, values.end());
-        return *middle;
-    };
     std::array<float, 3> middle{};
     for (std::size_t c = 0; c < 3; ++c) middle[c] = middle_of(along[c]);
     std::vector<float> distances;

@@ -18,6 +18,7 @@
 #include "core/lattice.h"
 #include "htvm/encoder.hpp"
 #include "metrics/mesh_facts.h"
+#include "metrics/percentile.h"
 #include "surface/triangle_cleaning.h"
 
 namespace htvm::app {
@@ -57,7 +58,9 @@ struct Report {
 
 // ---- Looking at frames ----------------------------------------------------------------------------------------------
 
-CheckedFrame look_at(const Capture& capture, const Mesh& mesh) {
+// origin: of the lattice on which the first frame put all; nothing: it has no position.
+CheckedFrame look_at(const Capture& capture, const Mesh& mesh,
+                     const std::optional<std::array<std::int32_t, 3>>& origin) {
     CheckedFrame out;
     out.name = capture.name();
     out.timestamp_us = capture.timestamp_us();
@@ -71,12 +74,17 @@ CheckedFrame look_at(const Capture& capture, const Mesh& mesh) {
         out.texture_width = textured->texture->width;
         out.texture_height = textured->texture->height;
     }
-    if (const auto origin = internal::lattice_origin(mesh))
-        if (const auto on_lattice = internal::to_lattice(mesh, internal::Lattice{*origin, 4})) {
-            const auto cleaned = internal::clean_triangles(on_lattice->positions, on_lattice->triangles);
-            out.doubled = cleaned.doubled;
-            out.turned = cleaned.turned;
-        }
+    if (!origin) return out;
+    constexpr int bits = 5;  // of the lattice that encode takes for people
+    const auto on_lattice = internal::to_lattice(mesh, internal::Lattice{*origin, bits});
+    // As far from the first frame as a stream's coordinates reach, whether it is tried or not.
+    if (!on_lattice) {
+        out.wrong = out.name + ": " + on_lattice.error().message;
+        return out;
+    }
+    const auto cleaned = internal::clean_triangles(on_lattice->positions, on_lattice->triangles);
+    out.doubled = cleaned.doubled;
+    out.turned = cleaned.turned;
     return out;
 }
 
@@ -150,18 +158,12 @@ Result<Report> look_at_all(const Options& options) {
             if (!capture->survives_errors()) break;
             continue;
         }
-        auto frame = look_at(*capture, **mesh);
-        frame.missing_before = capture->missing_before();
-        frame.repeats = !before.empty() && before == (*mesh)->positions;
-        // As far from the first frame as a stream's coordinates reach, whether it is tried or not.
-        auto why = trial.add(**mesh, frame.timestamp_us);
         if (!origin)
             if (const auto found = internal::lattice_origin(**mesh)) origin = *found;
-        constexpr int bits = 5;  // of the lattice that encode takes for people
-        if (origin && why.empty())
-            if (const auto reached = internal::to_lattice(**mesh, internal::Lattice{*origin, bits}); !reached)
-                why = reached.error().message;
-        if (!why.empty()) frame.wrong = frame.name + ": " + why;
+        auto frame = look_at(*capture, **mesh, origin);
+        frame.missing_before = capture->missing_before();
+        frame.repeats = !before.empty() && before == (*mesh)->positions;
+        if (const auto why = trial.add(**mesh, frame.timestamp_us); !why.empty()) frame.wrong = frame.name + ": " + why;
         before = std::move((*mesh)->positions);
         report.frames.push_back(std::move(frame));
         progress.step();
@@ -179,13 +181,6 @@ std::vector<double> values_of(const Report& report, Value value) {
     for (const auto& frame : report.frames)
         if (frame.wrong.empty()) out.push_back(static_cast<double>(value(frame)));
     return out;
-}
-
-double middle_of(std::vector<double> values) {
-    if (values.empty()) return 0;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 // The middle one of the changes from frame to frame, as a share of what changes.

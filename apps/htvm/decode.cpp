@@ -118,10 +118,8 @@ public:
         if (image.bytes && !std::exchange(told_of_images_, true))
             note("standard output has no room for the pictures of the texture; -o with a folder or a pattern has");
         if (auto ok = scale_positions(mesh, 1 / millimetres_per_unit); !ok) return tl::unexpected(ok.error());
-        std::array<double, 3> origin{};
-        for (std::size_t c = 0; c < 3; ++c)
-            origin[c] = static_cast<double>(sequence.global_shift[c]) / millimetres_per_unit;
-        const auto bytes = write_ply(mesh, time_text(info.timestamp_us), {}, {}, origin);
+        const auto bytes = write_ply(mesh, time_text(info.timestamp_us), {}, {},
+                                     in_units(sequence.global_shift, millimetres_per_unit));
         if (!bytes) return tl::unexpected(bytes.error());
         if (auto ok = write_standard_output(*bytes); !ok) return tl::unexpected(ok.error());
         return std::string("-");

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <optional>
 
+#include "codec/format/sequence.h"
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
 #include "effort_log.h"
@@ -197,7 +198,7 @@ Result<void> set_texture(const EncodePlan& plan, const Capture& capture, Encoder
 // What a shift takes off a coordinate on the axis that is up, mm.
 double shift_along(UpAxis up, const GlobalShift& shift) {
     if (up == UpAxis::unknown) return 0;
-    return static_cast<double>(shift[(static_cast<std::size_t>(up) - 1) / 2]);
+    return static_cast<double>(shift[internal::axis_of(up)]);
 }
 
 Result<EncoderOptions> settings_for(const EncodePlan& plan, const Capture& capture) {

@@ -177,24 +177,31 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
     if (!textures) return tl::unexpected(textures.error());
     source.mesh_at = [meshes = *files, told = std::set<std::string>(), textures = std::move(*textures)](
                          MeshSource& self, std::size_t position) mutable -> Result<TexturedMesh> {
-        if (self.guesses_unit || self.finds_shift) {
-            const auto mesh = read_mesh_of(meshes, position);
-            if (!mesh) return tl::unexpected(mesh.error());
+        const auto read = [&](double millimetres_per_unit, const GlobalShift& shift) {
+            MeshFileOptions file_options;
+            file_options.millimetres_per_unit = millimetres_per_unit;
+            file_options.reading.origin = in_units(shift, millimetres_per_unit);
+            return textures.read(position, TextureUse::where_colourless, file_options);
+        };
+        const bool is_known = !self.guesses_unit && !self.finds_shift;
+        auto textured = is_known ? read(self.millimetres_per_unit, self.global_shift) : read(1, {});
+        if (!textured) return textured;
+        if (!is_known) {
             if (std::exchange(self.guesses_unit, false))
                 self.millimetres_per_unit =
-                    millimetres_per(unit_of_frames(meshes, position).value_or(guess_unit(*mesh)));
-            if (std::exchange(self.finds_shift, false)) self.global_shift = shift_of(*mesh, self.millimetres_per_unit);
+                    millimetres_per(unit_of_frames(meshes, position).value_or(guess_unit(textured->mesh)));
+            if (std::exchange(self.finds_shift, false))
+                self.global_shift = shift_of(textured->mesh, self.millimetres_per_unit);
+            if (self.global_shift != GlobalShift{})
+                textured = read(self.millimetres_per_unit, self.global_shift);
+            else if (const auto ok = scale_positions(textured->mesh, self.millimetres_per_unit); !ok)
+                return tl::unexpected(ok.error());
+            if (!textured) return textured;
         }
-        MeshFileOptions file_options;
-        file_options.millimetres_per_unit = self.millimetres_per_unit;
-        for (std::size_t c = 0; c < 3; ++c)
-            file_options.reading.origin[c] = static_cast<double>(self.global_shift[c]) / self.millimetres_per_unit;
-        auto textured = textures.read(position, TextureUse::where_colourless, file_options);
-        if (!textured) return textured;
+        auto& [mesh, texture, file] = *textured;
         for (const auto& [about, text, is_loss] : textures.findings().remarks)
             if (is_loss && told.insert(about).second)
                 warn(fmt::format("{}: {}", meshes.paths[position].string(), text));
-        auto& [mesh, texture, file] = *textured;
         if (texture) mesh.colours = colours_from_texture(mesh, *texture);
         return textured;
     };

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/letter_case.h"
 #include "io/drc.h"
 #include "io/gltf.h"
 #include "io/obj.h"
@@ -21,9 +22,7 @@ namespace {
 enum class MeshFormat { ply, obj, drc, glb, gltf };
 
 std::optional<MeshFormat> format_of(const std::filesystem::path& path) {
-    std::string extension = path.extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    const std::string extension = internal::lower_case(path.extension().string());
     if (extension == ".ply") return MeshFormat::ply;
     if (extension == ".obj") return MeshFormat::obj;
     if (extension == ".drc") return MeshFormat::drc;
@@ -145,9 +144,7 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         if (auto ok = scale_positions(scaled, 1 / options.millimetres_per_unit); !ok) return fail_at(path, ok.error());
         written = &scaled;
     }
-    std::array<double, 3> origin{};
-    for (std::size_t c = 0; c < 3; ++c)
-        origin[c] = static_cast<double>(options.global_shift[c]) / options.millimetres_per_unit;
+    const auto origin = in_units(options.global_shift, options.millimetres_per_unit);
     if (*format != MeshFormat::obj) {
         const auto bytes = *format == MeshFormat::ply
                                ? write_ply(*written, options.timestamp, options.texture, {}, origin)
@@ -164,6 +161,12 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         write_obj(*written, options.texture.empty() ? std::string() : material.filename().string(), origin);
     if (!text) return fail_at(path, text.error());
     return write_file(path, *text);
+}
+
+std::array<double, 3> in_units(const GlobalShift& shift, double millimetres_per_unit) {
+    std::array<double, 3> out{};
+    for (std::size_t c = 0; c < 3; ++c) out[c] = static_cast<double>(shift[c]) / millimetres_per_unit;
+    return out;
 }
 
 Result<LengthUnit> length_unit(std::string_view symbol) {

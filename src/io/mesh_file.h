@@ -56,6 +56,9 @@ Result<void> scale_positions(Mesh& mesh, double factor);
 
 enum class LengthUnit { millimetre, centimetre, decimetre, metre, inch, foot };
 
+// The shift in a unit of so many millimetres.
+std::array<double, 3> in_units(const GlobalShift& shift, double millimetres_per_unit);
+
 struct LengthUnitNames {
     LengthUnit unit;
     const char* symbol;  // "mm"

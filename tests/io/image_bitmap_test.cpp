@@ -9,22 +9,15 @@
 #include <vector>
 
 #include "io/image_file.h"
+#include "io/image_samples.h"
 
 namespace htvm {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
+using samples::append;
+using samples::error_of;
 using testing::HasSubstr;
-
-Error error_of(std::span<const std::uint8_t> bytes) {
-    const auto read = read_image(bytes);
-    return read ? Error{} : read.error();
-}
-
-void append(Bytes& bytes, std::uint32_t value, int count) {
-    for (int i = 0; i < count; ++i)
-        bytes.push_back(i < 4 ? static_cast<std::uint8_t>(value >> (8 * i)) : std::uint8_t{0});
-}
 
 // A header of 40 bytes, what stands behind it (masks or a palette), and the pixels.
 Bytes bmp(int width, int height, std::uint32_t bits, std::uint32_t coding, const Bytes& tables, const Bytes& pixels) {

@@ -8,21 +8,15 @@
 #include <vector>
 
 #include "io/image_file.h"
+#include "io/image_samples.h"
 
 namespace htvm {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
+using samples::append;
+using samples::error_of;
 using testing::HasSubstr;
-
-Error error_of(std::span<const std::uint8_t> bytes) {
-    const auto read = read_image(bytes);
-    return read ? Error{} : read.error();
-}
-
-void append(Bytes& bytes, std::uint32_t value, int count) {
-    for (int i = 0; i < count; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
-}
 
 Bytes dds(std::uint32_t width, std::uint32_t height, std::uint32_t flags, const std::string& kind, std::uint32_t bits,
           std::initializer_list<std::uint32_t> masks, const Bytes& behind) {

@@ -32,6 +32,18 @@ inline Image plain(int width, int height, const Colour& colour) {
     return image;
 }
 
+// What reading the bytes fails with; no error if it does not.
+inline Error error_of(std::span<const std::uint8_t> bytes) {
+    const auto read = read_image(bytes);
+    return read ? Error{} : read.error();
+}
+
+// So many bytes of a value, the least significant first.
+inline void append(std::vector<std::uint8_t>& bytes, std::uint32_t value, int count) {
+    for (int i = 0; i < count; ++i)
+        bytes.push_back(i < 4 ? static_cast<std::uint8_t>(value >> (8 * i)) : std::uint8_t{0});
+}
+
 inline std::vector<std::uint8_t> webp_of(const Image& image) {
     std::uint8_t* bytes = nullptr;
     const auto size = WebPEncodeLosslessRGB(image.rgb.data(), image.width, image.height, 3 * image.width, &bytes);
