@@ -46,6 +46,23 @@ enum class TrackedReferences : std::uint8_t {
                // refers to the reference alone
 };
 
+// Whether surface comes and goes, as where depth cameras see a person from some sides: then frames say what is there.
+enum class SurfacePresence : std::uint8_t {
+    automatic,  // by the first mesh: if it has borders
+    off,
+    on,
+};
+
+enum class HoleFilling : std::uint8_t {
+    off,        // what is not seen is not shown, but for noise at its rims
+    automatic,  // holes that open for a moment, in what was seen around them, are filled by what is known
+};
+
+enum class Specks : std::uint8_t {
+    keep,       // as captured
+    automatic,  // small parts that hang on nothing are left out
+};
+
 enum class Denoising : std::uint8_t {
     off,        // T-frames follow the capture, noise and all
     automatic,  // they follow it without the noise that is measured, if any is: fewer bits, and nearer the true surface
@@ -73,6 +90,9 @@ struct TrackedOptions {
     double patch_share = 0.3;  // where tracking is lost, the largest share of the mesh that a patch may replace; where
                                // more is lost, an I-frame is sent; 0: always
     Denoising denoise = Denoising::automatic;  // with a target error always off: that is measured against the capture
+    SurfacePresence presence = SurfacePresence::automatic;
+    HoleFilling fill = HoleFilling::automatic;  // where surface comes and goes
+    Specks specks = Specks::automatic;          // likewise
     double node_spacing = 0;  // mm between the nodes of the deformation graph; 0: 80 on an adult, in proportion to size
                               // on other subjects
 };

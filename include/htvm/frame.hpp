@@ -57,6 +57,7 @@ enum class Layer : std::uint8_t {
     removed = 13,  // what a patch takes out
     border = 14,   // where a patch is joined
     charts = 15,   // how triangles lie in the texture's picture
+    presence = 16, // which vertices are there
 };
 
 struct LayerName {
@@ -79,6 +80,7 @@ inline constexpr std::array frame_layers = {
     LayerName{Layer::removed, "removed"},
     LayerName{Layer::border, "border"},
     LayerName{Layer::charts, "charts"},
+    LayerName{Layer::presence, "presence"},
 };
 inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // the largest number plus one; 0 is not a layer
 

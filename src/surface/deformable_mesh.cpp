@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "surface/open_border.h"
 
 namespace htvm::internal {
 
@@ -251,6 +252,10 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
         mesh.fine.samples.push_back(static_cast<std::uint32_t>(mesh.fine.samples.size()));
         mesh.sample_normals.push_back(normals[v]);
         mesh.fine.blends.push_back(mesh.blends[v]);
+    }
+    if (options.open) {
+        const auto from_border = edges_from_border(mesh.positions, mesh.triangles);
+        for (const auto v : mesh.samples) mesh.sample_from_border.push_back(from_border[v]);
     }
     for (std::uint32_t i = 0; i < mesh.samples.size(); i += 2) mesh.coarse.samples.push_back(i);
     parallel_invoke(

@@ -59,6 +59,12 @@ struct DeformationOptions {
                                // does
     int surface_rounds = 3;    // last fine rounds in which the target is matched to the reference's triangles, not to
                                // its vertices alone
+    // Whether both surfaces may end where the other goes on, as views of depth cameras do: what is matched to a border
+    // from beyond it then says nothing.
+    bool open = false;
+    std::span<const std::uint8_t> present = {};  // one per vertex of the reference, 0 where nothing was seen of it
+                                                 // lately: it is matched to what is near alone; or none
+    AdultMillimetres unseen_reach{10};           // how near
     Threads threads = {};
     const std::atomic<bool>* in_vain = nullptr;  // once it is set no more rounds are made: nobody wants the result
 };
@@ -114,6 +120,7 @@ struct DeformableMesh {
                                            // OrientedPoints::no_point
     std::vector<VertexFan> sample_fans;    // one per sample, at rest
     std::vector<Point3f> sample_normals;
+    std::vector<std::uint8_t> sample_from_border;  // one per sample: edges_from_border(); none unless options.open
     std::vector<SampleTexture> sample_textures;  // one per sample, or none if nothing is textured
     float sample_gap = 0;                        // approximate spacing of neighbouring samples
     DeformationLevel fine, coarse;

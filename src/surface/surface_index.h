@@ -231,6 +231,7 @@ public:
     std::vector<Point3f> positions;  // of the mesh's vertices
     std::vector<Triangle> triangles;
     std::vector<Colour> colours;  // one per vertex, or none
+    std::vector<std::uint8_t> from_border;  // of each vertex: edges_from_border(); or none: nobody asks for borders
     // For searches by direction; empty if there are none:
     TrianglesAround around;              // each vertex
     std::vector<Point3f> normals;        // one per vertex, unit length; zero where no triangle has an area

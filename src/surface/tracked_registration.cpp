@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/parallel.h"
+#include "surface/open_border.h"
 
 namespace htvm::internal {
 
@@ -229,6 +230,9 @@ struct MatchSearch {
     float target_gap;  // spacing of the target's vertices, or in far rounds of its samples
     float sample_gap;  // spacing of the moved samples
     std::size_t skip;  // of the target's samples, every how many-th is matched back
+    std::vector<std::uint8_t> from_border;  // of the moved samples, or none
+    std::span<const std::uint8_t> present;  // DeformationOptions::present
+    float unseen_reach;
     MovedGrid grid;    // of the moved samples
 };
 
@@ -277,6 +281,20 @@ OrientedMatch nearest_moved_sample(const MatchSearch& search, const Point3f& poi
                                         guess == OrientedPoints::no_point ? last : guess);
 }
 
+// Whether a match may say nothing: of what was not seen lately, unless it is near; and where what was found lies on a
+// border and the match leads along the surface to it, so that the surface may go on unseen. In far rounds, which search
+// among fewer points, what is beside a border counts as on it.
+bool says_nothing(const MatchSearch& search, const Match& match, std::span<const std::uint8_t> from_border,
+                  std::uint32_t found, float squared_distance) {
+    if (!search.present.empty()) {
+        const auto vertex = search.mesh.samples[search.level.samples[match.sample]];
+        if (search.present[vertex] == 0 && squared_distance > search.unseen_reach * search.unseen_reach) return true;
+    }
+    if (from_border.empty()) return false;
+    const auto inside = search.round.far ? far_from_border : std::uint8_t{1};
+    return from_border[found] < inside && match.along.norm() > match.gap;
+}
+
 // From a sample to the target. guess: where the last round found it, set to where it is; last: as above. Both ways a
 // match that is not found is left as it is.
 void match_forward(const MatchSearch& search, std::size_t sample, std::uint32_t last, std::uint32_t& guess,
@@ -291,6 +309,7 @@ void match_forward(const MatchSearch& search, std::size_t sample, std::uint32_t 
     if (!match.found) return;
     guess = match.index;
     out = match_of(moved, static_cast<std::uint32_t>(sample), search.target, match.index, search.target_gap);
+    if (says_nothing(search, out, search.target.from_border, match.index, match.squared_distance)) return;
     out.weight = match_weight(match.squared_distance, search.round);
 }
 
@@ -301,6 +320,7 @@ void match_back(const MatchSearch& search, std::uint32_t vertex, std::uint32_t l
     if (!match.found) return;
     guess = match.index;
     out = match_of(search.moved, match.index, search.target, vertex, search.round.gap);
+    if (says_nothing(search, out, search.from_border, match.index, match.squared_distance)) return;
     auto squared_distance = static_cast<double>(match.squared_distance);
     if (search.round.surfaces) {
         const auto near = nearest_around(search.mesh, search.moved.vertices, match.index, place);
@@ -344,6 +364,9 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLev
     constexpr AdultMillimetres cell(30);  // of the grid of moved samples
     const std::size_t skip = round.far ? 2 : 1;
     const auto samples = std::max<std::size_t>(moved.points.size(), 1);
+    std::vector<std::uint8_t> from_border;
+    if (!mesh.sample_from_border.empty())
+        for (const auto i : level.samples) from_border.push_back(mesh.sample_from_border[i]);
     const MatchSearch search{.mesh = mesh,
                              .level = level,
                              .moved = moved,
@@ -355,6 +378,9 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLev
                              .sample_gap = mesh.sample_gap * std::sqrt(static_cast<float>(mesh.samples.size()) /
                                                                        static_cast<float>(samples)),
                              .skip = skip,
+                             .from_border = std::move(from_border),
+                             .present = options.present,
+                             .unseen_reach = static_cast<float>(options.scale.on_lattice(options.unseen_reach).value),
                              .grid = {moved, static_cast<float>(options.scale.on_lattice(cell).value)}};
     guesses.forward.resize(moved.points.size(), OrientedPoints::no_point);
     guesses.back.resize(target.samples.size() / skip, OrientedPoints::no_point);

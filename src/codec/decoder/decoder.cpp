@@ -8,6 +8,7 @@
 #include "codec/decoder/frame_decoders.h"
 #include "codec/format/decoder_limits.h"
 #include "codec/format/frame_kinds.h"
+#include "codec/tracked/presence.h"
 #include "core/memory_guard.h"
 #include "core/parallel.h"
 
@@ -52,6 +53,16 @@ void repeat(std::span<const std::uint32_t> copied, Values& values) {
 
 }  // namespace
 
+std::uint32_t topology_of_present(DecoderState& state, std::uint32_t reference_topology,
+                                  std::span<const std::uint8_t> presence) {
+    if (!anything_absent(presence)) return reference_topology;
+    auto& last = state.shown_presence;
+    if (last.reference_topology == reference_topology && std::ranges::equal(last.presence, presence))
+        return last.topology;
+    last = {reference_topology, new_topology(state), Presence(presence.begin(), presence.end())};
+    return last.topology;
+}
+
 void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topology, Pose pose) {
     const auto& lattice = state.header->lattice;
     const auto* textured = mesh.textured && !mesh.textured->empty() ? mesh.textured : nullptr;
@@ -68,6 +79,12 @@ void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topolo
         shown.texcoords_topology = topology;
     }
     shown.triangles = textured ? textured->triangles : mesh.triangles;
+    if (anything_absent(mesh.presence)) {
+        Presence present(mesh.presence.begin(), mesh.presence.end());
+        if (textured) repeat(textured->copied, present);
+        triangles_shown(shown.triangles, present, shown.own_triangles);
+        shown.triangles = shown.own_triangles;
+    }
     shown.colours = mesh.colours;
     if (textured) {
         repeat(textured->copied, shown.positions);

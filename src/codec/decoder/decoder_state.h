@@ -26,9 +26,17 @@ struct LatticeMeshView {
     std::span<const QuantisedNormal> normals;
     std::span<const QuantisedTexcoord> texcoords;
     const TexturedSurface* textured = nullptr;  // how it is shown where the stream has charts
+    std::span<const std::uint8_t> presence{};   // one per vertex, or none: all are there
 };
 inline LatticeMeshView view_of(const LatticeMesh& mesh, const TexturedSurface* textured = nullptr) {
     return {mesh.positions, mesh.triangles, mesh.colours, mesh.normals, mesh.texcoords, textured};
+}
+
+// The mesh of an I- or TP-frame, which is the reference of what follows.
+inline LatticeMeshView view_of(const Reference& reference) {
+    auto out = view_of(reference.mesh(), &reference.textured);
+    out.presence = reference.presence;
+    return out;
 }
 
 // The frame decoded last, in millimetres. Arrays are reused from frame to frame; triangles and colours stay where they
@@ -41,9 +49,16 @@ struct ShownFrame {
     std::uint32_t texcoords_topology = 0;  // topology number of the frame they belong to
     std::span<const Triangle> triangles;
     std::span<const Colour> colours;
-    std::vector<Colour> own_colours;  // where vertices are repeated
+    std::vector<Colour> own_colours;     // where vertices are repeated
+    std::vector<Triangle> own_triangles;  // where some are not there
     LatticeMesh own;                  // the mesh of a frame that shares nothing with its reference
     Pose pose;
+};
+
+// What of the reference was shown last, where that was not all of it, and the number given to it.
+struct ShownPresence {
+    std::uint32_t reference_topology = 0, topology = 0;
+    Presence presence;
 };
 
 // State left by the EP- and P-frames since the I-frame.
@@ -93,6 +108,7 @@ struct DecoderState {
     std::optional<Reference> reference;
     std::uint32_t reference_topology = 0;
     std::uint32_t topologies = 0;  // how many numbers were given out
+    ShownPresence shown_presence;
     DecodedBones bones;
     DecodedNodes nodes;
     std::optional<UnreferredIntra> unreferred;  // where that is the newest frame
@@ -104,6 +120,11 @@ inline std::uint32_t new_topology(DecoderState& state) {
     if (++state.topologies == 0) ++state.topologies;  // wraps after 2^32; 0 means none
     return state.topologies;
 }
+
+// The topology number for what is there of a reference: the reference's own where all of it is, and that of the frame
+// before where that had the same triangles.
+std::uint32_t topology_of_present(DecoderState& state, std::uint32_t reference_topology,
+                                  std::span<const std::uint8_t> presence);
 
 // Makes this the mesh that is shown. The mesh is not copied: if the object is moved later, its arrays must stay in
 // place, as those of a std::vector do. Throws only std::bad_alloc; then nothing is shown.

@@ -2,6 +2,7 @@
 #include "codec/decoder/frame_decoders.h"
 #include "codec/format/frame_kinds.h"
 #include "codec/intra/intra_frame.h"
+#include "codec/tracked/presence.h"
 
 namespace htvm::internal {
 
@@ -22,6 +23,12 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
                         packet.has(packet_flag::flags_valid) && packet.has(packet_flag::of_tracked_mesh), header);
     auto textured = read_charts(state, payload, *mesh);
     if (!textured) return tl::unexpected(textured.error());
+    Presence presence;
+    if (header.version >= presence_version && payload.has(Layer::presence)) {
+        auto read = read_presence_layer(payload.of(Layer::presence), mesh->positions.size(), mesh->triangles);
+        if (!read) return tl::unexpected(read.error());
+        presence = std::move(*read);
+    }
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     if (!referred) {
@@ -35,12 +42,13 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     ReferenceFacts facts{.number = packet.frame,
                          .step = step,
                          .captured = {payload.header.source_vertices, payload.header.source_triangles},
-                         .textured = std::move(*textured)};
+                         .textured = std::move(*textured),
+                         .presence = std::move(presence)};
     auto reference = make_reference(header, std::move(facts), std::move(*mesh), std::move(*pose),
                                     {.bones = false, .nodes = false}, state.threads);
     if (!reference) return tl::unexpected(reference.error());
     derive_hierarchy(*reference, header);
-    show(state, view_of(reference->mesh(), &reference->textured), topology, std::move(shown));
+    show(state, view_of(*reference), topology_of_present(state, topology, reference->presence), std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*reference);
     state.reference_topology = topology;

@@ -1,6 +1,7 @@
 // Decodes TP-frames: a T-frame of which a part is replaced. The patched mesh is the reference of what follows.
 #include "codec/decoder/frame_decoders.h"
 #include "codec/format/frame_kinds.h"
+#include "codec/tracked/presence.h"
 #include "codec/tracked/surface_patch.h"
 
 namespace htvm::internal {
@@ -39,10 +40,14 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
                                                  corners_that_stay(before.corners, triangles,
                                                                    reference.mesh.positions.size(), patched->stays));
     if (!textured) return tl::unexpected(textured.error());
+    Presence presence;
+    if (reference.has_presence)
+        presence = presence_of_patched(tracked.state.presence, patched->stays, mesh.positions.size());
     ReferenceFacts facts{.number = packet.frame,
                          .captured = {payload.header.source_vertices, payload.header.source_triangles},
                          .kept = keep_nodes(reference.nodes, patched->stays),
-                         .textured = std::move(*textured)};
+                         .textured = std::move(*textured),
+                         .presence = std::move(presence)};
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     // Its nodes are for the next frame to derive, so that no frame has to do the work of two. A part is done here by a
@@ -51,7 +56,7 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
                                   {.bones = false, .nodes = false}, state.threads);
     if (!renewed) return tl::unexpected(renewed.error());
     if (!derives_for_itself) derive_hierarchy(*renewed, header);
-    show(state, view_of(renewed->mesh(), &renewed->textured), topology, std::move(shown));
+    show(state, view_of(*renewed), topology_of_present(state, topology, renewed->presence), std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*renewed);
     state.reference_topology = topology;

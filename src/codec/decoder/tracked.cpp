@@ -38,8 +38,9 @@ Pose tracked_pose(const DecoderState& state, std::span<const QuantisedTransform>
 void show_tracked(DecoderState& state, const DecodedTrackedFrame& frame, Pose pose) {
     const auto& mesh = state.reference->mesh();
     show(state,
-         {frame.positions, mesh.triangles, frame.colours, frame.normals, mesh.texcoords, &state.reference->textured},
-         state.reference_topology, std::move(pose));
+         {frame.positions, mesh.triangles, frame.colours, frame.normals, mesh.texcoords, &state.reference->textured,
+          frame.state.presence},
+         topology_of_present(state, state.reference_topology, frame.state.presence), std::move(pose));
 }
 
 // Shows a frame that is decoded, and remembers it to be shown again. Throws only std::bad_alloc.

@@ -6,6 +6,7 @@
 #include "codec/format/frame_kinds.h"
 #include "codec/intra/intra_frame.h"
 #include "codec/reference/reference.h"
+#include "codec/tracked/presence.h"
 
 namespace htvm::internal {
 namespace {
@@ -21,8 +22,17 @@ std::uint8_t flags_of(const CodedFrame& frame) {
 ShownMesh shown(CodedFrame& frame, const TexturedSurface* of_reference) {
     const bool own = rules_of(frame.type).codes_mesh || !of_reference;
     const auto& textured = own ? frame.textured : *of_reference;
-    if (textured.empty()) return {std::move(frame.decoded), {}};
-    return {shown_mesh(frame.decoded, textured), textured.copied};
+    ShownMesh out;
+    if (textured.empty())
+        out.mesh = std::move(frame.decoded);
+    else
+        out = {shown_mesh(frame.decoded, textured), textured.copied};
+    if (!anything_absent(frame.presence)) return out;
+    auto presence = frame.presence;
+    for (const auto v : out.repeated) presence.push_back(presence[v]);
+    const auto whole = std::move(out.mesh.triangles);
+    triangles_shown(whole, presence, out.mesh.triangles);
+    return out;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "codec/encoder/configuration.h"
 #include "codec/format/frame_payload.h"
+#include "codec/reference/node_reference.h"
 #include "codec/reference/textured_surface.h"
 #include "codec/reference/transforms.h"
 #include "core/lattice.h"
@@ -38,6 +39,7 @@ struct CodedFrame {
     bool access = true;            // whether it is an I-frame or refers to a reference
     bool of_tracked_mesh = false;  // I: whether it was made of that, not of the capture
     LatticeMesh decoded;           // the mesh that the decoder will have, without the seams of charts
+    Presence presence;             // what of it is there; none: all is
     TexturedSurface textured;      // I, TP: of `decoded`, if the stream has charts
     CapturedCounts captured;       // of the mesh that it was made of
     LayerBytes shares;             // of a payload that is a run (FrameRules::is_run): its layers' bytes

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "codec/encoder/tracking_numbers.h"
+#include "surface/open_border.h"
 
 namespace htvm::internal {
 namespace {
@@ -36,6 +37,11 @@ int lattice_bits(const EncoderOptions& options, double adult) {
     const auto bits_for = [&](double units) { return static_cast<int>(std::ceil(std::log2(units / finest))); };
     const int of_size = 4 - static_cast<int>(std::lround(std::log2(adult)));
     return std::clamp(std::max(bits_for(8), std::min(of_size, bits_for(64))), 4, 16);
+}
+
+bool tells_presence(const EncoderOptions& options, const Mesh& first) {
+    if (options.tracked.presence != SurfacePresence::automatic) return options.tracked.presence == SurfacePresence::on;
+    return options.key_interval > 1 && share_on_border(first.positions, first.triangles) > open_from_share;
 }
 
 FrameSteps steps_of(const Configuration& configuration, const QualitySteps& steps) {
@@ -92,6 +98,7 @@ Result<PoseTracker> configure(Configuration& configuration, const Mesh& mesh, co
     header.nearest_vertices = static_cast<std::uint8_t>(options.topology.nearest_vertices);
     header.weight_width = on_lattice(options.topology.weight_width * units);
     if (options.profile == Profile::tracked) {
+        if (tells_presence(options, mesh)) header.version = presence_version;
         const double spacing = options.tracked.node_spacing > 0 ? options.tracked.node_spacing
                                                                 : tracking_numbers.node_spacing.value * adult;
         header.node_spacing = std::max(on_lattice(spacing * units), 1);

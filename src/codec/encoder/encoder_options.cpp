@@ -13,6 +13,9 @@ namespace {
 
 constexpr std::array<const char*, 2> tracked_references = {"intra", "previous"};
 constexpr std::array<const char*, 2> denoising = {"off", "auto"};
+constexpr std::array<const char*, 2> hole_filling = {"off", "auto"};
+constexpr std::array<const char*, 2> specks = {"keep", "auto"};
+constexpr std::array<const char*, 3> surface_presence = {"auto", "off", "on"};
 constexpr std::array<const char*, 3> captured_normals = {"auto", "keep", "none"};
 constexpr std::array<const char*, 4> frame_choices = {"fixed", "motion", "rd", "cheaper"};
 constexpr std::array<const char*, 7> up_axes = {"unknown", "x", "-x", "y", "-y", "z", "-z"};
@@ -297,6 +300,33 @@ constexpr Option list[] = {
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.denoise); },
      .set = [](EncoderOptions& o, double value) { o.tracked.denoise = static_cast<Denoising>(value); },
      .flag = "--denoise"},
+    {.name = "tracked.presence",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::word,
+     .meaning = "surface that comes and goes, as where depth cameras see a person from some sides: auto, frames say what "
+                "is there if the first mesh has borders; on, they do; off, all of a reference is always there",
+     .words = surface_presence,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.presence); },
+     .set = [](EncoderOptions& o, double value) { o.tracked.presence = static_cast<SurfacePresence>(value); },
+     .flag = "--presence"},
+    {.name = "tracked.fill",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::word,
+     .meaning = "where surface comes and goes, holes that open for a moment in what was seen around them: auto, they are "
+                "filled by what is known; off, they are shown",
+     .words = hole_filling,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.fill); },
+     .set = [](EncoderOptions& o, double value) { o.tracked.fill = static_cast<HoleFilling>(value); },
+     .flag = "--fill-holes"},
+    {.name = "tracked.specks",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::word,
+     .meaning = "where surface comes and goes, small parts that hang on nothing: auto, they are left out; keep, they are "
+                "shown",
+     .words = specks,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.specks); },
+     .set = [](EncoderOptions& o, double value) { o.tracked.specks = static_cast<Specks>(value); },
+     .flag = "--specks"},
     {.name = "tracked.node_spacing",
      .group = OptionGroup::tracked,
      .kind = OptionKind::number,

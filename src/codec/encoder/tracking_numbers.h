@@ -53,6 +53,13 @@ struct TrackingNumbers {
     int most_patches = 24;          // behind one I-frame: whoever joins late needs all of them
     double most_patches_bytes = 4;  // all together, in times the I-frame's
 
+    // ---- Where surface comes and goes: when what is captured beside the tracked mesh is added to it
+    double much_uncovered = 0.03;     // share of the captured surface from which on it is added at once
+    AdultMillimetres grown_from{30};  // side of a square as large as what is uncovered in a region, from which on it is
+    int grown_after = 6;              // added, these many frames behind the last patch
+    int forgotten_after = 150;        // frames for which a vertex was not seen: the next I-frame leaves it out
+    double most_grown = 2.5;          // as most_renewed_vertices, where the reference grows with what is seen
+
     // ---- When an I-frame is sent
     double most_others = 0.1;  // share of the vertices that have other texture coordinates: the atlas is laid out anew
     double most_renewed_vertices = 1.3;  // of the tracked mesh, in times those of the last I-frame made of the capture:

@@ -10,7 +10,7 @@ using enum Layer;
 constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
     {.type = FrameType::intra,
      .packet = PacketKind::intra,
-     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra, charts},
+     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra, charts, presence},
      .refers_to = RefersTo::nothing,
      .codebooks = false,
      .referred = true,
@@ -38,7 +38,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .rate = RateClass::moved},
     {.type = FrameType::tracked,
      .packet = PacketKind::tracked,
-     .layers = {transforms, geometry, colour},
+     .layers = {transforms, geometry, colour, presence},
      .is_run = true,
      .refers_to = RefersTo::reference_or_before,
      .codebooks = false,

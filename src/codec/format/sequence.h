@@ -18,9 +18,9 @@
 namespace htvm::internal {
 
 // Raised with every change of the syntax, or of a constant that both sides use. Versions from oldest_version to
-// newest_version are read, stream_version is written, grouped_version where T-frames come in groups, and
-// textured_version where there is a texture.
-inline constexpr std::uint16_t stream_version = 4, newest_version = 6;
+// newest_version are read, stream_version is written, grouped_version where T-frames come in groups, textured_version
+// where there is a texture, and presence_version where surface comes and goes.
+inline constexpr std::uint16_t stream_version = 4, newest_version = 7;
 inline constexpr std::uint16_t oldest_version = 1;
 
 // From this version on a sequence header has a session. The headers of all versions since have the same syntax.
@@ -35,6 +35,8 @@ inline constexpr std::uint16_t grouped_version = 5;
 // From this version on a sequence header says how meshes wear a texture, and frames may have charts
 // (charts/chart_layer.h).
 inline constexpr std::uint16_t textured_version = 6;
+// From this version on a frame says which of its reference's vertices are there (tracked/presence.h).
+inline constexpr std::uint16_t presence_version = 7;
 
 // The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (bones/mtfan.h). The
 // paper's are 8, 16 and 32.

@@ -17,6 +17,9 @@
 
 namespace htvm::internal {
 
+// One per vertex: 1 it is there, 0 it is not; or none: all are there.
+using Presence = std::vector<std::uint8_t>;
+
 // What both sides know of the nodes, one entry per node.
 struct NodeGraph {
     std::vector<LatticePoint> pivots;               // where the nodes sit
@@ -31,6 +34,11 @@ struct NodeReference {
     NodeGraph graph;
     VertexHierarchy hierarchy;
     CapturedCounts captured;  // what the I-frame was captured with; make_node_reference() does not know it
+    // Where the stream tells what is there (tracked/presence.h), which make_node_reference() does not know either: which
+    // vertices of the mesh are, and those around each.
+    bool has_presence = false;
+    Presence presence;
+    VerticesAround around;
 };
 // What is derived first, for a frame that does a part of the next one's work.
 struct NodesAhead {

@@ -35,7 +35,13 @@ Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Th
                                      std::exchange(reference.ahead, std::nullopt));
     if (!nodes) return tl::unexpected(nodes.error());
     reference.by_nodes = std::move(*nodes);
-    reference.by_nodes->captured = reference.captured;
+    auto& by_nodes = *reference.by_nodes;
+    by_nodes.captured = reference.captured;
+    if (header.version >= presence_version) {
+        by_nodes.has_presence = true;
+        by_nodes.presence = reference.presence;
+        by_nodes.around = vertices_around(by_nodes.mesh.positions.size(), by_nodes.mesh.triangles);
+    }
     return {};
 }
 
@@ -47,6 +53,7 @@ Result<Reference> make_reference(const SequenceHeader& header, ReferenceFacts fa
     out.captured = facts.captured;
     out.kept = std::move(facts.kept);
     out.textured = std::move(facts.textured);
+    out.presence = std::move(facts.presence);
     out.skinned.mesh = std::move(mesh);
     out.skinned.joints = std::move(pose.joints);
     out.skinned.orientations = std::move(pose.orientations);

@@ -25,6 +25,7 @@ struct Reference {
     std::optional<NodeReference> by_nodes;  // what depends on the nodes, if it was derived
     KeptNodes kept;                         // of a patched mesh: what it takes over of the nodes before
     std::optional<NodesAhead> ahead;        // of what depends on the nodes, if only this was derived so far
+    Presence presence;                      // of the mesh's vertices, in streams that tell it
     const LatticeMesh& mesh() const { return skinned.mesh; }
 };
 
@@ -41,6 +42,7 @@ struct ReferenceFacts {
     CapturedCounts captured;
     KeptNodes kept = {};  // of a TP-frame
     TexturedSurface textured = {};
+    Presence presence = {};
 };
 
 // Smooths an I-frame's mesh within its quantiser cells, as it is shown in streams with nodes from

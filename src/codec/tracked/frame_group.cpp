@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "codec/tracked/presence.h"
 #include "core/bytes.h"
 #include "core/lattice.h"
 
@@ -172,6 +173,8 @@ TrackedState state_between(const NodeReference& reference, const FramesAround& a
     const auto captured = earlier ? earlier->head.captured : reference.captured;
     const auto count = [&](std::uint32_t a, std::uint32_t b) { return static_cast<std::uint32_t>(mean.of(a, b)); };
     TrackedState out;
+    if (reference.has_presence)
+        out.presence = presence_between(earlier ? earlier->presence : reference.presence, later.presence);
     out.head.captured = {count(captured.vertices, later.head.captured.vertices),
                          count(captured.triangles, later.head.captured.triangles)};
     out.head.motion = around.above->motion;

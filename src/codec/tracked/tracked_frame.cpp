@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "codec/reference/transforms.h"
+#include "codec/tracked/presence.h"
 #include "core/bytes.h"
 #include "core/parallel.h"
 
@@ -192,9 +193,14 @@ Result<void> decode_tracked_frame(std::span<const std::uint8_t> payload, const N
         from.colour_before = &before->colour;
     }
     const auto head_end = run.position();
+    out.state.presence.clear();
+    if (reference.has_presence)
+        out.state.presence = read_presence(run, reference.around, before ? before->presence : reference.presence);
+    const auto presence_end = reference.has_presence ? run.position() : 0;
     auto ends = decode_layers(from, reference, threads, out);
     if (!ends) return tl::unexpected(ends.error());
     ends->head = head_end;
+    ends->presence = presence_end;
     out.shares = layer_shares(*ends, payload.size(), head->colour_run);
     return {};
 }

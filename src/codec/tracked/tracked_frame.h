@@ -25,6 +25,7 @@ struct TrackedState {
     TrackedHead head;
     std::vector<QuantisedTransform> transforms;  // one per node
     FieldHistory displacement, colour;
+    Presence presence;  // one per vertex; none in streams that do not tell it
 };
 
 // What differs from the reference: everything except triangles and texture coordinates.

@@ -109,6 +109,7 @@ LayerBytes layer_shares(const TrackedRunEnds& ends, std::size_t bytes, std::size
         out[layer] = end - at;
         at = end;
     };
+    if (ends.presence > 0) give(Layer::presence, ends.presence);
     give(Layer::transforms, ends.motion);
     give(Layer::geometry, ends.displacement);
     if (colour_run == 0) give(Layer::colour, ends.colour);

@@ -1,6 +1,6 @@
 // A T-frame's payload from version 3 of the stream on: one run of the range coder, without any table. First the head,
-// which says how the layers are quantised; then node motion, displacement and, where the reference has colours, their
-// change. Counts, attributes and what predicts each layer follow from the reference, and what is as in the frame before
+// which says how the layers are quantised; from presence_version on which vertices are there; then node motion,
+// displacement and, where the reference has colours, their change. Counts, attributes and what predicts each layer follow from the reference, and what is as in the frame before
 // takes a bit. Colours of many bytes are a run of their own behind the first, so that two threads read side by side.
 // (Versions 1 and 2 have a run for each layer, in a payload like those of other frames.)
 #pragma once
@@ -41,6 +41,7 @@ Result<TrackedHead> read_tracked_head(RangeDecoder& decoder, const KnownOfHead& 
 // Where in the first run its parts end: position() behind each; the colours' if they are in it.
 struct TrackedRunEnds {
     std::size_t head = 0, motion = 0, displacement = 0, colour = 0;
+    std::size_t presence = 0;  // behind the head; 0 in streams without
 };
 // The layers' shares of a payload of so many bytes, to the nearest byte. What they leave is the head and the run's end.
 LayerBytes layer_shares(const TrackedRunEnds& ends, std::size_t bytes, std::size_t colour_run);

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "core/parallel.h"
+#include "surface/open_border.h"
 #include "surface/simplification.h"
 #include "surface/surface_index.h"
 
@@ -248,6 +249,38 @@ std::vector<SurfacePoint> targets_of(const SurfaceSamples& samples, std::span<co
     return out;
 }
 
+// Whether a point of a surface lies on its border, and so far from the query along the surface that this may go on
+// unseen. from_border: of the surface's vertices.
+bool is_beyond_border(const SurfacePoint& found, const Triangle& corners, std::span<const std::uint8_t> from_border,
+                      const Point3f& query, const Point3f& normal, float slip) {
+    constexpr float none_of_it = 1e-3F;
+    bool on_side = false;
+    for (std::size_t i = 0; i < 3; ++i) {
+        if (found.shares[i] <= none_of_it)
+            on_side = true;
+        else if (from_border[corners[i]] != 0)
+            return false;
+    }
+    if (!on_side) return false;
+    float across = 0, squared = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float apart = found.point[axis] - query[axis];
+        across += apart * normal[axis];
+        squared += apart * apart;
+    }
+    return squared - across * across > slip * slip;
+}
+
+// What lies beyond the captured surface's border is not found.
+void leave_out_what_is_beyond(const SurfaceSamples& samples, const SurfaceIndex& surface,
+                              std::vector<SurfacePoint>& targets) {
+    const float slip = 0.35F * surface.fine_gap;
+    for (std::size_t i = 0; i < targets.size(); ++i)
+        if (targets[i].found() && is_beyond_border(targets[i], surface.triangles[targets[i].triangle],
+                                                   surface.from_border, samples.points[i], samples.normals[i], slip))
+            targets[i] = {};
+}
+
 // At each sample, how far the surface is along its normal, in lattice units, and what its colour is less that of the
 // reference, in levels.
 std::vector<Four> seen_at(const SurfaceSamples& samples, const MovedReference& moved, const SampleRule& rule,
@@ -296,6 +329,7 @@ SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions&
         points_of(mesh.positions), mesh.triangles,
         {.cell = static_cast<float>(2 * edge), .samples = options.back_samples, .threads = options.threads});
     out.colours = mesh.colours;
+    if (options.open) out.from_border = edges_from_border(out.positions, out.triangles);
     return out;
 }
 
@@ -307,10 +341,15 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
     const auto samples = samples_of(moved, rule);
     const std::size_t vertices = moved.positions.size();
     near.resize(vertices, OrientedPoints::no_point);
-    const auto targets = targets_of(samples, moved.triangles, surface, how, near);
+    auto targets = targets_of(samples, moved.triangles, surface, how, near);
+    TrackedTargets out;
+    if (!surface.from_border.empty()) {
+        leave_out_what_is_beyond(samples, surface, targets);
+        out.seen.resize(vertices);
+        for (std::size_t v = 0; v < vertices; ++v) out.seen[v] = targets[v].found() ? 1 : 0;
+    }
     const auto fit = make_surface_fit(moved, rule, targets);
     const auto fitted = fit.fitted(seen_at(samples, moved, rule, captured, targets, threads));
-    TrackedTargets out;
     out.near = std::move(near);
     out.displacement.resize(vertices);
     // A field cannot code more than this: 16 mm on the finest lattice. The surface then lags behind by the rest.
@@ -375,15 +414,29 @@ CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double>
 
 namespace {
 
-// Every n-th vertex, and the centre of every n-th triangle; of each the vertex that it is, or a corner.
+// Every n-th vertex, and the centre of every n-th triangle; of each the corners, or the vertex three times.
 struct SparseSamples {
     SurfaceSamples samples;
-    std::vector<std::uint32_t> vertex;
+    std::vector<Triangle> corners;
     // What is known of these vertices; no_point where nothing is.
     std::vector<std::uint32_t> at_vertices(std::span<const std::uint32_t> known) const {
-        std::vector<std::uint32_t> out(vertex.size(), OrientedPoints::no_point);
-        for (std::size_t i = 0; i < out.size() && !known.empty(); ++i) out[i] = known[vertex[i]];
+        std::vector<std::uint32_t> out(corners.size(), OrientedPoints::no_point);
+        for (std::size_t i = 0; i < out.size() && !known.empty(); ++i) out[i] = known[corners[i][0]];
         return out;
+    }
+    // Without those of which a corner is refused.
+    template <class Refused>
+    void leave_out(const Refused& refused) {
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            if (std::ranges::any_of(corners[i], refused)) continue;
+            corners[kept] = corners[i];
+            samples.points[kept] = samples.points[i];
+            samples.normals[kept++] = samples.normals[i];
+        }
+        corners.resize(kept);
+        samples.points.resize(kept);
+        samples.normals.resize(kept);
     }
 };
 
@@ -396,11 +449,11 @@ SparseSamples sparse_samples_of(const SurfaceIndex& surface) {
          v += every) {
         out.samples.points.push_back(points[v]);
         out.samples.normals.push_back(surface.normals[v]);
-        out.vertex.push_back(v);
+        out.corners.push_back({v, v, v});
     }
     for (std::size_t t = 0, every = 1 + triangles.size() / wanted; t < triangles.size(); t += every) {
         add_middle(out.samples, points, surface.normals, triangles[t]);
-        out.vertex.push_back(triangles[t][0]);
+        out.corners.push_back(triangles[t]);
     }
     return out;
 }
@@ -421,7 +474,7 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
     return {LatticeUnits(std::sqrt(squares / count)),
             static_cast<double>(strays) / count,
             LatticeUnits(cube_errors(points, squared, options.region, fewest, left_out).worst()),
-            {}};
+            {}, 0, {}};
 }
 
 // The captured surface's normals tell the two sides of, say, a sleeve apart. near: of each sample a captured vertex
@@ -437,27 +490,73 @@ std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, std::vec
     return squared;
 }
 
+// The captured surface as it lies from the decoded one: the distances, and which samples nothing is tracked beside.
+struct FromCaptured {
+    std::vector<double> squared;
+    std::vector<std::uint8_t> uncovered;  // none where the decoded mesh's borders are not known
+};
+
 // Searched among all of the decoded mesh: found along it, what is lost is noticed later, and a dancer takes 7 to 10 %
 // more bits. near: of each sample a decoded vertex that may be beside it.
-TrackedFit fit_of_captured(const SurfaceSamples& captured, std::span<const std::uint32_t> near,
-                           const SurfaceIndex& decoded, const TrackedFitOptions& options) {
+FromCaptured distances_of_captured(const SurfaceSamples& captured, std::span<const std::uint32_t> near,
+                                   const SurfaceIndex& decoded, const TrackedFitOptions& options) {
     const auto reach = static_cast<float>(options.reach.value);
-    std::vector<double> squared(captured.points.size(), options.reach.value * options.reach.value);
+    FromCaptured out;
+    out.squared.assign(captured.points.size(), options.reach.value * options.reach.value);
+    const bool open = !decoded.from_border.empty();
+    out.uncovered.assign(open ? captured.points.size() : 0, 0);
+    const auto look = [&](std::size_t i, std::uint32_t& guess) {
+        if (near[i] != OrientedPoints::no_point) guess = near[i];
+        const auto found = decoded.closest_within(captured.points[i], reach, guess);
+        if (found.found()) out.squared[i] = std::min(out.squared[i], static_cast<double>(found.squared_distance));
+        if (open)
+            out.uncovered[i] = !found.found() || is_beyond_border(found, decoded.triangles[found.triangle],
+                                                                  decoded.from_border, captured.points[i],
+                                                                  captured.normals[i], decoded.fine_gap);
+    };
     // Guesses may decide what is found, so they must not depend on how the threads cut the range.
     constexpr std::size_t in_a_row = 256;
-    parallel_for((squared.size() + in_a_row - 1) / in_a_row, options.threads, 2,
+    parallel_for((out.squared.size() + in_a_row - 1) / in_a_row, options.threads, 2,
                  [&](std::size_t begin, std::size_t end) {
                      for (std::size_t row = begin; row < end; ++row) {
                          std::uint32_t guess = OrientedPoints::no_point;
-                         for (std::size_t i = row * in_a_row; i < std::min(squared.size(), (row + 1) * in_a_row); ++i) {
-                             if (near[i] != OrientedPoints::no_point) guess = near[i];
-                             const auto found = decoded.closest_within(captured.points[i], reach, guess);
-                             if (found.found())
-                                 squared[i] = std::min(squared[i], static_cast<double>(found.squared_distance));
-                         }
+                         for (std::size_t i = row * in_a_row; i < std::min(out.squared.size(), (row + 1) * in_a_row);
+                              ++i)
+                             look(i, guess);
                      }
                  });
-    return summed_up(captured.points, squared, options);
+    return out;
+}
+
+// How much of the captured surface is uncovered, in all and in the fullest cube. area: of the captured surface.
+void measure_uncovered(std::span<const Point3f> points, std::span<const std::uint8_t> uncovered, double area,
+                       LatticeUnits side, TrackedFit& fit) {
+    std::map<CubeErrors::Cube, std::size_t> in_cubes;
+    std::size_t all = 0, most = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (uncovered[i] == 0) continue;
+        ++all;
+        most = std::max(most, ++in_cubes[cube_of(points[i], side)]);
+    }
+    if (all == 0) return;
+    const auto count = static_cast<double>(points.size());
+    fit.uncovered_share = static_cast<double>(all) / count;
+    fit.widest_uncovered = LatticeUnits(std::sqrt(area * static_cast<double>(most) / count));
+}
+
+double area_of(const SurfaceIndex& surface) {
+    double out = 0;
+    for (const auto& t : surface.triangles)
+        out += length(area_vector(std::span<const Point3f>(surface.positions), t)) / 2;
+    return out;
+}
+
+template <class Value>
+void keep_covered(std::vector<Value>& values, std::span<const std::uint8_t> uncovered) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < uncovered.size(); ++i)
+        if (uncovered[i] == 0) values[kept++] = values[i];
+    values.resize(kept);
 }
 
 }  // namespace
@@ -472,21 +571,41 @@ TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& 
                                std::span<const std::uint32_t> near, std::span<const double> intra_squared,
                                const TrackedFitOptions& options) {
     const double edge = mean_edge(decoded.positions, decoded.triangles, 8);
-    const SurfaceIndex index(
+    SurfaceIndex index(
         points_of(decoded.positions), decoded.triangles,
         {.cell = static_cast<float>(std::max(2 * edge, options.reach.value / 24)), .threads = options.threads});
     std::vector<std::uint32_t> beside(captured.positions.size(), OrientedPoints::no_point);
     for (std::uint32_t v = 0; v < near.size(); ++v)
         if (near[v] != OrientedPoints::no_point) beside[near[v]] = v;
-    const auto of_captured = sparse_samples_of(captured), of_decoded = sparse_samples_of(index);
-    const auto forth = fit_of_captured(of_captured.samples, of_captured.at_vertices(beside), index, options);
+    if (!captured.from_border.empty()) index.from_border = edges_from_border(index.positions, index.triangles);
+    auto of_captured = sparse_samples_of(captured), of_decoded = sparse_samples_of(index);
+    if (!captured.from_border.empty())
+        of_captured.leave_out([&](std::uint32_t v) { return captured.from_border[v] == 0; });
+    auto from_captured = distances_of_captured(of_captured.samples, of_captured.at_vertices(beside), index, options);
+    TrackedFit out;
+    if (!from_captured.uncovered.empty()) {
+        measure_uncovered(of_captured.samples.points, from_captured.uncovered, area_of(captured), options.region, out);
+        keep_covered(of_captured.samples.points, from_captured.uncovered);
+        keep_covered(from_captured.squared, from_captured.uncovered);
+    }
+    const auto forth = summed_up(of_captured.samples.points, from_captured.squared, options);
     auto squared = distances_of_decoded(of_decoded.samples, of_decoded.at_vertices(near), captured, options);
     std::vector<double> more(squared.size(), 0);
     if (intra_squared.size() == squared.size())
         for (std::size_t i = 0; i < squared.size(); ++i) more[i] = std::max(0.0, squared[i] - intra_squared[i]);
+    if (!options.seen.empty()) {
+        std::vector<std::uint8_t> unseen;
+        for (const auto& t : of_decoded.corners)
+            unseen.push_back(options.seen[t[0]] == 0 || options.seen[t[1]] == 0 || options.seen[t[2]] == 0);
+        keep_covered(of_decoded.samples.points, unseen);
+        keep_covered(more, unseen);
+    }
     const auto back = summed_up(of_decoded.samples.points, more, options);
-    return {std::max(forth.rms, back.rms), std::max(forth.stray_share, back.stray_share),
-            std::max(forth.worst_region, back.worst_region), std::move(squared)};
+    out.rms = std::max(forth.rms, back.rms);
+    out.stray_share = std::max(forth.stray_share, back.stray_share);
+    out.worst_region = std::max(forth.worst_region, back.worst_region);
+    out.squared = std::move(squared);
+    return out;
 }
 
 Merging at_same_place(const LatticeMesh& captured) {

@@ -32,6 +32,8 @@ struct MovedReference {
 
 struct TrackedTargets {
     std::vector<std::uint32_t> near;  // of each vertex, the captured vertex beside it, or OrientedPoints::no_point
+    std::vector<std::uint8_t> seen;  // of each vertex whether it lies beside captured surface, not beyond a border of
+                                     // it; none where the surface's borders are not known
     std::vector<std::int32_t> displacement;  // one per vertex, in lattice units along its normal
     std::vector<std::int32_t> colours;       // three per vertex, levels to add; empty if the reference has no colours
 };
@@ -73,6 +75,9 @@ struct TrackedFit {
     double stray_share = 0;       // share of the samples that are farther than `stray`
     LatticeUnits worst_region;    // the RMS distance in the worst cube of space
     std::vector<double> squared;  // squared distances of the decoded mesh's samples from the captured surface
+    // Of surface that comes and goes, which counts as uncovered, not as far off, where nothing is tracked beside it:
+    double uncovered_share = 0;    // of the captured samples
+    LatticeUnits widest_uncovered;  // side of a square as large as what is uncovered in one cube
 };
 
 struct TrackedFitOptions {
@@ -82,12 +87,15 @@ struct TrackedFitOptions {
     LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.fit_reach);
     // Side of the cubes, > 0; cubes with few samples are left out.
     LatticeUnits region = Scale{}.on_lattice(tracking_numbers.region);
+    std::span<const std::uint8_t> seen = {};  // of each decoded vertex whether it counts; none: all do
     Threads threads = {};
 };
 
 // captured: index of the captured mesh. near: TrackedTargets::near of the frame's targets, or nothing. intra_squared:
 // `squared` of the I-frame whose connectivity `decoded` has, or empty for the I-frame itself. Errors that the I-frame
-// had at a sample do not count against the frame, since the search misses some long triangles, as those of a sole.
+// had at a sample do not count against the frame, since the search misses some long triangles, as those of a sole. Where
+// the borders of the captured surface are known, what lies at one does not count, nor what lies beyond one of the decoded
+// mesh.
 TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
                                std::span<const std::uint32_t> near, std::span<const double> intra_squared,
                                const TrackedFitOptions& options);

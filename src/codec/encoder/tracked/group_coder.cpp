@@ -32,6 +32,7 @@ public:
         const auto& held = held_[frame.frame - 1];
         auto options = tracked_frame_options(configuration_, held.steps);
         options.noise = &held.noise;
+        options.presence = held.presence;
         std::optional<TrackedState> between;
         if (frame.later > 0) {
             between = state_between(

@@ -19,6 +19,7 @@ struct HeldFrame {
     NodeRegistration registered;
     FrameSteps steps;    // asked for
     RemovedNoise noise;  // of the capture
+    Presence presence;   // what is there, in streams that tell it
 };
 
 // What a group may refer to, besides the reference.

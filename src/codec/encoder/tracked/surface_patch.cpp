@@ -10,6 +10,7 @@
 #include "core/disjoint_sets.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
+#include "surface/open_border.h"
 
 // A patch is made in four steps:
 //  1. Which vertices of the tracked mesh are lost (find_lost). The two surfaces are compared in both directions, since
@@ -205,6 +206,16 @@ struct Capture {
     std::vector<Point3f> points{}, normals{};
     std::vector<SurfacePoint> on_decoded{};  // the nearest point of the tracked mesh to each vertex
 
+    std::vector<std::uint8_t> from_border{};  // edges_from_border(), where surface comes and goes; else none
+
+    // Whether a vertex is one of the ragged rim of surface that comes and goes.
+    bool at_ragged_rim(std::uint32_t v) const { return !from_border.empty() && from_border[v] < 2; }
+    // Whether the tracked mesh is this near a vertex.
+    bool is_covered(std::uint32_t v, LatticeUnits near) const {
+        const auto& found = on_decoded[v];
+        return found.found() && static_cast<double>(found.squared_distance) <= near.value * near.value;
+    }
+
     std::optional<NearestPoints> along_rim{};  // points of the border, half a side apart
     LatticeUnits rim_reach{};                  // what is nearer than this to one of them is at the border
 
@@ -250,6 +261,10 @@ std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& sh
             error[i] = distance > options.lost / 2 && capture.ends_at(samples[i]) ? 0 : distance.value;
         }
     });
+    for (std::size_t v = 0; v < tracked.seen.size(); ++v)
+        if (tracked.seen[v] == 0) error[v] = 0;
+    for (std::size_t t = 0; t < decoded.triangles.size(); ++t)
+        if (tracked.is_unseen(decoded.triangles[t])) error[points.size() + t] = 0;
     std::vector<double> out(points.size(), 0);
     for (std::size_t v = 0; v < out.size(); ++v) {
         const auto triangles = shown.around.of(v);
@@ -261,17 +276,21 @@ std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& sh
     return out;
 }
 
+// Parts that hang on nothing are left, or added, from this area on: in those of a speck.
+constexpr double smallest_part = 4;
+
 // In squared lattice units.
 double area_of_speck(const SurfacePatchOptions& options) { return options.speck.value * options.speck.value; }
 
 // Vertices of the tracked mesh around captured surface that it does not cover: they are lost, so that the hole in which
-// the uncovered surface belongs opens there. Specks of it do not count.
-void add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, const SurfacePatchOptions& options,
+// the uncovered surface belongs opens there. Specks of it do not count, nor do ragged rims. Gives whether there is
+// uncovered surface with nothing around it.
+bool add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, const SurfacePatchOptions& options,
                            std::vector<bool>& lost) {
     const auto& mesh = capture.mesh;
     std::vector<bool> uncovered(mesh.positions.size());
-    for (std::size_t v = 0; v < uncovered.size(); ++v)
-        uncovered[v] = !capture.on_decoded[v].found() || distance_to(capture.on_decoded[v], {}) > options.lost;
+    for (std::uint32_t v = 0; v < uncovered.size(); ++v)
+        uncovered[v] = !capture.at_ragged_rim(v) && !capture.is_covered(v, options.lost);
     std::vector<Triangle> there;
     std::copy_if(mesh.triangles.begin(), mesh.triangles.end(), std::back_inserter(there),
                  [&](const Triangle& t) { return uncovered[t[0]] || uncovered[t[1]] || uncovered[t[2]]; });
@@ -285,20 +304,30 @@ void add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, c
         for (const auto v : t)
             if (uncovered[v]) area[regions.of(v)] += third;
     }
+    std::vector<bool> has_rim(uncovered.size(), false);
     for (const auto& t : there)
         for (const auto from : t)
             for (const auto to : t)
-                if (uncovered[from] && !uncovered[to] && area[regions.of(from)] > area_of_speck(options))
+                if (uncovered[from] && capture.is_covered(to, options.lost) &&
+                    area[regions.of(from)] > area_of_speck(options)) {
+                    has_rim[regions.of(from)] = true;
                     for (const auto corner : decoded.triangles[capture.on_decoded[to].triangle]) lost[corner] = true;
+                }
+    for (std::uint32_t v = 0; v < uncovered.size(); ++v)
+        if (uncovered[v] && regions.of(v) == v && !has_rim[v] && area[v] > smallest_part * area_of_speck(options))
+            return true;
+    return false;
 }
 
 // Marks the corners of triangles that are stretched, or turned against a neighbour beside which they lay flat.
-std::vector<bool> distorted(const LatticeMesh& decoded, std::span<const LatticePoint> rest, const Sides& sides,
-                            const SurfacePatchOptions& options) {
+std::vector<bool> distorted(const TrackedMesh& tracked, const Sides& sides, const SurfacePatchOptions& options) {
     constexpr double folded = -0.5, flat = 0.5;
+    const auto& decoded = tracked.decoded;
+    const auto rest = tracked.rest;
     std::vector<bool> out(decoded.positions.size(), false);
     if (rest.size() != decoded.positions.size()) return out;
     const auto mark = [&](std::uint32_t triangle) {
+        if (tracked.is_unseen(decoded.triangles[triangle])) return;
         for (const auto v : decoded.triangles[triangle]) out[v] = true;
     };
     const auto side_length = [&](std::span<const LatticePoint> positions, std::uint32_t s) {
@@ -331,8 +360,9 @@ std::vector<double> errors_around(std::span<const Point3f> points, std::span<con
     constexpr std::ptrdiff_t fewest = 4;
     std::vector<double> squared, of_capture;
     for (const double distance : error) squared.push_back(distance * distance);
-    for (const auto& found : capture.on_decoded) {
-        const double distance = distance_to(found, options.reach).value;
+    for (std::uint32_t v = 0; v < capture.on_decoded.size(); ++v) {
+        const double distance =
+            capture.at_ragged_rim(v) ? 0 : distance_to(capture.on_decoded[v], options.reach).value;
         of_capture.push_back(distance * distance);
     }
     const auto back = cube_errors(points, squared, options.region, fewest),
@@ -409,8 +439,7 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
           const SurfacePatchOptions& options) {
     constexpr int rounds = 12, smoothing = 3;
     constexpr double most_gone = 0.6;
-    constexpr double smallest = 4;  // island that stays, in areas of a speck
-    const double least = smallest * area_of_speck(options);
+    const double least = smallest_part * area_of_speck(options);
     const std::size_t vertices = removed.size();
     std::vector<double> area_of_triangle;
     for (const auto& t : decoded.triangles) area_of_triangle.push_back(area_of(decoded.positions, t));
@@ -636,10 +665,10 @@ private:
     }
 };
 
-// Without the parts that do not reach the open border, and without crumbs.
-LatticeMesh parts_that_join(const Cutting& cutting, const SurfacePatchOptions& options) {
+// Without the parts that do not reach the open border, unless they may be added alone, and without crumbs.
+LatticeMesh parts_that_join(const Cutting& cutting, bool alone, const SurfacePatchOptions& options) {
     constexpr double crumb = 0.25;  // side of a square, in specks
-    const double least = crumb * crumb * area_of_speck(options);
+    const double least = crumb * crumb * area_of_speck(options), least_alone = smallest_part * area_of_speck(options);
     const auto& all = cutting.mesh;
     const std::size_t vertices = all.positions.size();
     DisjointSets parts(vertices);
@@ -653,7 +682,7 @@ LatticeMesh parts_that_join(const Cutting& cutting, const SurfacePatchOptions& o
     std::vector<std::uint32_t> number(vertices, none);
     for (auto t : all.triangles) {
         const auto part = parts.of(t[0]);
-        if (!wanted[part] || area[part] < least) continue;
+        if (wanted[part] ? area[part] < least : !alone || area[part] < least_alone) continue;
         for (auto& v : t) {
             if (number[v] == none) {
                 number[v] = static_cast<std::uint32_t>(out.positions.size());
@@ -670,7 +699,7 @@ LatticeMesh parts_that_join(const Cutting& cutting, const SurfacePatchOptions& o
 // What of the captured surface lies farther outside than the gap, as far as it reaches the open border: the rest is
 // none of this patch's.
 LatticeMesh cut_piece(const Outside& outside, const Capture& capture, const SurfacePatchOptions& options) {
-    return parts_that_join(Cutter(outside, capture.mesh, options.gap).run(), options);
+    return parts_that_join(Cutter(outside, capture.mesh, options.gap).run(), !capture.from_border.empty(), options);
 }
 
 // ---- 4. The join ----------------------------------------------------------------------------------------------------
@@ -974,6 +1003,7 @@ struct SurfacePatchSearch::Measured {
     std::vector<double> error_around;   // RMS in its cube of space
     std::vector<double> edge;           // mean length of the sides at it
     std::vector<bool> rims, bad_shape;  // what is lost whatever the error: around uncovered surface, and distorted
+    bool uncovered_alone = false;       // whether there is uncovered surface with nothing around it
     double area = 0;                    // of the tracked mesh
 
     Measured(const TrackedMesh& tracked, const LatticeMesh& mesh, const SurfaceIndex& index,
@@ -992,6 +1022,7 @@ Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, c
     capture.points = as_indexed ? surface.positions : points_of(capture.mesh.positions);
     capture.normals =
         as_indexed ? surface.normals : points_of(vertex_normals(capture.mesh.positions, capture.mesh.triangles));
+    if (!surface.from_border.empty()) capture.from_border = edges_from_border(capture.points, capture.mesh.triangles);
     // The sides of a border have both ends on it, so that of most captures hardly any triangles are looked at.
     std::vector<char> inside(capture.points.size(), 1);
     for (std::uint32_t v = 0; v < surface.positions.size(); ++v)
@@ -1032,7 +1063,7 @@ SurfacePatchSearch::Measured::Measured(const TrackedMesh& tracked, const Lattice
         shown.emplace(
             points_of(decoded.positions), decoded.triangles,
             SurfaceIndexOptions{.cell = static_cast<float>(std::max(2 * mean, 1.0)), .threads = options.threads});
-        bad_shape = distorted(decoded, tracked.rest, *sides, options);
+        bad_shape = distorted(tracked, *sides, options);
         measure_sides();
     };
     parallel_invoke(
@@ -1046,7 +1077,7 @@ SurfacePatchSearch::Measured::Measured(const TrackedMesh& tracked, const Lattice
     error = errors_of(tracked, *shown, *capture, options);
     error_around = errors_around(shown->positions, error, *capture, options);
     rims.assign(decoded.positions.size(), false);
-    add_rims_of_uncovered(*capture, decoded, options, rims);
+    uncovered_alone = add_rims_of_uncovered(*capture, decoded, options, rims) && !index.from_border.empty();
 }
 
 void SurfacePatchSearch::Measured::measure_sides() {
@@ -1076,7 +1107,9 @@ std::optional<SurfacePatch> SurfacePatchSearch::find(LatticeUnits region_lost) c
     const auto& options = m.options;
     const std::size_t vertices = m.decoded.positions.size();
     auto removed = find_lost(m.decoded, *m.sides, {m.error, m.error_around, m.rims, m.bad_shape}, region_lost, options);
-    if (std::find(removed.begin(), removed.end(), true) == removed.end()) return std::nullopt;
+    if (std::find(removed.begin(), removed.end(), true) == removed.end() && !m.uncovered_alone) return std::nullopt;
+    // Surface that comes and goes has borders everywhere: what cannot be joined stays open.
+    const bool open = !m.surface.from_border.empty();
     for (int attempt = 0; attempt < options.attempts; ++attempt) {
         tidy(removed, m.decoded, *m.sides, options);
         const auto stays = remainder_of(m.decoded, *m.sides, removed);
@@ -1087,7 +1120,8 @@ std::optional<SurfacePatch> SurfacePatchSearch::find(LatticeUnits region_lost) c
         const auto piece =
             simplified_piece(cut_piece(outside, *m.capture, options), m.captured, m.surface, options.simplification);
         auto join = Joiner(m.decoded, *m.sides, stays, piece, m.edge, *m.capture, options).run();
-        if (join.unclear.empty()) {
+        if (join.unclear.empty() || (open && attempt + 1 == options.attempts)) {
+            if (piece.triangles.empty() && open) return std::nullopt;
             SurfacePatch out;
             out.removed = std::move(removed);
             out.positions = piece.positions;

@@ -42,6 +42,10 @@ struct TrackedMesh {
     std::span<const LatticePoint> rest = {};   // its vertices in the mesh that it refers to, by which stretched and
                                                // folded triangles are told; or none
     std::span<const std::uint32_t> near = {};  // TrackedTargets::near, where searches begin; or none
+    std::span<const std::uint8_t> seen = {};   // TrackedTargets::seen: what is not cannot be lost; or none
+    bool is_unseen(const Triangle& t) const {
+        return !seen.empty() && (seen[t[0]] == 0 || seen[t[1]] == 0 || seen[t[2]] == 0);
+    }
 };
 
 // Looks for patches of one tracked mesh. What is lost is measured once, then it may be tried to replace more or less.
@@ -56,7 +60,8 @@ public:
 
     // region_lost: RMS distance from which on a cube is lost; 0: regions are lost by themselves. The result is nothing
     // if nothing is lost, too much is lost, the borders cannot be joined clearly, or the capture has texture
-    // coordinates: an I-frame is what is left then.
+    // coordinates: an I-frame is what is left then. Where the borders of the captured surface are known
+    // (SurfaceIndex::from_border), what it has beyond the tracked mesh is added, also where nothing goes.
     std::optional<SurfacePatch> find(LatticeUnits region_lost) const;
 
 private:

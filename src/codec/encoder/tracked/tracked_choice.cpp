@@ -52,7 +52,7 @@ bool is_lost(const TrackedWork& work, const TrackedFit& fit) {
 
 TrackedFit fit_of(const TrackedWork& work, const EncodedTrackedFrame& encoded) {
     const auto& origin = work.reference->origin;
-    return fit_of(work, encoded.mesh, origin.edge, encoded.near, origin.fit.squared);
+    return fit_of(work, encoded.mesh, origin.edge, {encoded.near, origin.fit.squared, encoded.seen});
 }
 
 // ---- What may follow ------------------------------------------------------------------------------------------------
@@ -80,9 +80,9 @@ bool patches_have_grown(const TrackedWork& work) {
 bool may_be_renewed(const TrackedWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
     const auto& origin = work.reference->origin;
     const double ratio = static_cast<double>(steps.geometry) / origin.steps.geometry;
+    const double most = work.configuration.tells_presence() ? numbers.most_grown : numbers.most_renewed_vertices;
     return work.configuration.options.rate.target_error <= 0 &&
-           static_cast<double>(tracked.positions.size()) <=
-               numbers.most_renewed_vertices * static_cast<double>(origin.vertices) &&
+           static_cast<double>(tracked.positions.size()) <= most * static_cast<double>(origin.vertices) &&
            ratio <= numbers.most_renewed_steps && ratio >= 1 / numbers.most_renewed_steps;
 }
 
@@ -112,7 +112,7 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
     const auto lost = std::min(allowed_in_region(work, work.sequence.history.best_fit),
                                numbers.lost_in_steps * LatticeUnits(steps.geometry));
     StageClock measuring(work.stages);
-    const SurfacePatchSearch search({tracked.mesh, reference.decoded.by_nodes->mesh.positions, tracked.near},
+    const SurfacePatchSearch search({tracked.mesh, reference.decoded.by_nodes->mesh.positions, tracked.near, tracked.seen},
                                     work.captured.mesh, work.surface, patch_options(work, steps));
     measuring.done("patch");
     for (const auto region_lost : {lost, LatticeUnits(0)}) {
@@ -133,6 +133,14 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
         return Patched(std::move(*out));
     }
     return Patched();
+}
+
+// Whether so much was captured beside what is tracked that the reference should grow: at once where it is much, else
+// now and then, since a patch takes the time of three frames.
+bool should_grow(const TrackedWork& work, const TrackedFit& fit) {
+    const auto since = std::int64_t{work.sequence.next_frame} - work.reference->decoded.number;
+    const auto wide = work.configuration.scale.on_lattice(numbers.grown_from);
+    return fit.uncovered_share > numbers.much_uncovered || (since >= numbers.grown_after && fit.widest_uncovered > wide);
 }
 
 // ---- The steps of a choice ------------------------------------------------------------------------------------------
@@ -248,12 +256,18 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         if (auto ok = look_for_limbs(work, tracking, steps, patches, *motion); !ok) return tl::unexpected(ok.error());
     }
 
-    // 4. Where it still is: a patch.
+    // 4. Where it still is, or where surface was captured that is not tracked: a patch.
     const auto& tracked = motion->coded.encoded;
     const bool expensive =
         may_be_intra(work) && static_cast<double>(motion->coded.bytes()) > work.reference->intra_bytes;
     const bool anew = expensive || texture_is_laid_out_anew(work, tracked.mesh);
-    if (!anew && motion->lost && was_lost && patches) {
+    const bool grows = !motion->lost && work.configuration.tells_presence() && should_grow(work, motion->fit);
+    if (!anew && patches && ((motion->lost && was_lost) || grows)) {
+        if (grows && !motion->coded.of_reference) {
+            auto of_reference = code_for_patches(work, *tracking.registered, steps, tracked.near);
+            if (!of_reference) return tl::unexpected(of_reference.error());
+            motion->for_patches = std::move(*of_reference);
+        }
         auto patched = patch(work, *tracking.registered, steps, motion->to_patch());
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) return Frame(std::move(**patched));
@@ -264,7 +278,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     const auto best_fit = best ? motion->fit.rms : best_before;
     if (!anew && !motion->lost && !due && !patches_have_grown(work)) return send(std::move(motion->coded), best_fit);
     const bool renewed = !anew && !motion->lost && may_be_renewed(work, steps, tracked.mesh);
-    auto intra = renewed ? code_renewal(work, steps, tracked.mesh) : code_intra(work, steps);
+    auto intra = renewed ? code_renewal(work, steps, tracked) : code_intra(work, steps);
     if (intra && !motion->lost) intra->best_fit = best_fit;
     return as_frame(std::move(intra));
 }

@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "codec/encoder/charts/chart_packing.h"
+#include "codec/intra/intra_frame.h"
 #include "codec/tracked/frame_group.h"
+#include "codec/tracked/presence.h"
 
 namespace htvm::internal {
 namespace {
@@ -64,17 +66,43 @@ std::optional<TexturedSurface> add_charts_of_piece(const PatchedSurface& patched
     return textured ? std::optional(std::move(*textured)) : std::nullopt;
 }
 
-// made_of: the mesh that is coded, the capture, simplified or not, or the tracked mesh. steps: asked for.
-Result<TrackedIntra> code_intra_of(const TrackedWork& work, const LatticeMesh& made_of, const FrameSteps& steps,
-                                   FrameSteps quantised, IntraUse use, bool renewal) {
+// What an I-frame is made of: the capture, simplified or not, or the tracked mesh, and what of that is there.
+struct IntraSource {
+    const LatticeMesh& mesh;
+    Presence presence = {};
+    bool renewal = false;
+};
+
+// Of the vertices of a coded mesh what is there, from what is of the mesh that it was made of: an intra coder orders
+// vertices as it will, so they are told by their places. Of several at one place, one is enough.
+Presence presence_by_place(const IntraSource& source, const LatticeMesh& coded, std::int32_t step) {
+    std::vector<LatticePoint> there;
+    for (std::size_t v = 0; v < source.presence.size(); ++v)
+        if (source.presence[v] != 0) there.push_back(to_grid(source.mesh.positions[v], step));
+    std::ranges::sort(there);
+    Presence out;
+    for (const auto& p : coded.positions)
+        out.push_back(std::ranges::binary_search(there, to_grid(p, step)) ? 1 : 0);
+    return out;
+}
+
+// steps: asked for.
+Result<TrackedIntra> code_intra_of(const TrackedWork& work, const IntraSource& source, const FrameSteps& steps,
+                                   FrameSteps quantised, IntraUse use) {
     const auto& configuration = work.configuration;
     const auto captured = counts_of(work.captured.mesh);
     const bool referred_to = use == IntraUse::reference;
     StageClock clock(work.stages);
     if (referred_to)
-        quantised.geometry = step_for_reference(mean_edge(made_of.positions, made_of.triangles), quantised.geometry);
-    auto coded = code_intra_mesh(configuration, made_of, quantised, renewal, captured, work.captured.pose);
+        quantised.geometry =
+            step_for_reference(mean_edge(source.mesh.positions, source.mesh.triangles), quantised.geometry);
+    auto coded = code_intra_mesh(configuration, source.mesh, quantised, source.renewal, captured, work.captured.pose);
     if (!coded) return tl::unexpected(coded.error());
+    Presence presence;
+    if (anything_absent(source.presence)) {
+        presence = presence_by_place(source, coded->decoded, quantised.geometry);
+        coded->payload.set(Layer::presence, write_presence_layer(coded->decoded.triangles, presence));
+    }
     auto charts = add_charts(coded->decoded, configuration.options.texture, coded->payload);
     if (!charts) return tl::unexpected(charts.error());
     TrackedIntra out;
@@ -85,8 +113,9 @@ Result<TrackedIntra> code_intra_of(const TrackedWork& work, const LatticeMesh& m
     frame.reference = work.sequence.next_frame;
     frame.textured = std::move(charts->textured);
     frame.decoded = std::move(coded->decoded);
+    frame.presence = std::move(presence);
     frame.captured = captured;
-    frame.of_tracked_mesh = renewal;
+    frame.of_tracked_mesh = source.renewal;
     // Under rate control also what stands in for a frame that does not fit may refer to it.
     frame.referred = carries_surface(work.captured.mesh) && !frame.decoded.triangles.empty() &&
                      (!configuration.intra_only() || configuration.options.rate.bits_per_second > 0);
@@ -98,14 +127,14 @@ Result<TrackedIntra> code_intra_of(const TrackedWork& work, const LatticeMesh& m
     origin.vertices = frame.decoded.positions.size();
     if (referred_to) origin.colours = colours_at(work, frame.decoded);
     clock.done("intra coding");
-    if (referred_to && frame.referred) origin.fit = fit_of(work, frame.decoded, origin.edge, {}, {});
+    if (referred_to && frame.referred) origin.fit = fit_of(work, frame.decoded, origin.edge, {});
     return out;
 }
 
 Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameSteps& steps, IntraUse use) {
     const bool simplify = work.configuration.options.tracked.simplify > 0 && carries_surface(work.captured.mesh);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
-    return code_intra_of(work, simplify ? simple : work.captured.mesh, steps, tracked_steps(steps), use, false);
+    return code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use);
 }
 
 // Not where frames are to have an error that is measured against the capture, noise and all.
@@ -120,6 +149,15 @@ TargetFilterOptions filter_options(const TrackedWork& work) {
     return {LatticeUnits(steps.geometry), 1.0 * steps.colour, LatticeUnits(origin.edge)};
 }
 
+PresenceOptions presence_options(const Configuration& configuration) {
+    const auto& tracked = configuration.options.tracked;
+    PresenceOptions out;
+    out.fill = tracked.fill == HoleFilling::automatic;
+    out.leave_out_specks = tracked.specks == Specks::automatic;
+    out.speck = configuration.scale.on_lattice(tracking_numbers.speck);
+    return out;
+}
+
 // before: state of the frame that it refers to; null if that is the reference.
 Result<EncodedTrackedFrame> encode(const TrackedWork& work, const NodeRegistration& registered, const FrameSteps& steps,
                                    MotionParts parts, const TrackedState* before,
@@ -131,6 +169,10 @@ Result<EncodedTrackedFrame> encode(const TrackedWork& work, const NodeRegistrati
     options.motion_alone = parts == MotionParts::motion_alone;
     options.target_samples = work.effort.target_samples;
     options.near = near;
+    if (configuration.tells_presence()) {
+        options.presence_options = presence_options(configuration);
+        options.presence_before = &work.sequence.history.presence;
+    }
     return encode_tracked_frame(work.captured.mesh, work.surface, *work.reference->decoded.by_nodes, registered, before,
                                 work.sequence.history.targets, options, work.stages);
 }
@@ -166,11 +208,40 @@ Result<TrackedIntra> code_unreferred_intra(const TrackedWork& work, const FrameS
     return code_intra_of_capture(work, steps, IntraUse::none);
 }
 
-Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
+namespace {
+
+// Without what was not seen for long, where surface comes and goes.
+LatticeMesh seen_lately(const EncodedTrackedFrame& tracked, Presence& presence) {
+    const auto& unseen = tracked.presence.unseen;
+    const auto& whole = tracked.mesh;
+    std::vector<std::uint32_t> kept, number(whole.positions.size(), OrientedPoints::no_point);
+    presence.clear();
+    for (std::uint32_t v = 0; v < whole.positions.size(); ++v) {
+        if (tracked.state.presence[v] == 0 && unseen[v] > tracking_numbers.forgotten_after) continue;
+        number[v] = static_cast<std::uint32_t>(kept.size());
+        kept.push_back(v);
+        presence.push_back(tracked.state.presence[v]);
+    }
+    auto out = kept_vertices(whole, kept);
+    for (const auto& t : whole.triangles)
+        if (const Triangle own{number[t[0]], number[t[1]], number[t[2]]};
+            std::ranges::find(own, OrientedPoints::no_point) == own.end())
+            out.triangles.push_back(own);
+    return out;
+}
+
+}  // namespace
+
+Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps,
+                                  const EncodedTrackedFrame& tracked) {
     auto quantised = tracked_steps(steps);
     quantised.geometry =
         std::max(1, static_cast<std::int32_t>(std::lround(tracking_numbers.finer_renewed * quantised.geometry)));
-    auto out = code_intra_of(work, tracked, steps, quantised, IntraUse::reference, true);
+    Presence presence;
+    const bool tells_presence = !tracked.presence.unseen.empty();
+    const auto lately = tells_presence ? seen_lately(tracked, presence) : LatticeMesh{};
+    auto out = code_intra_of(work, {tells_presence ? lately : tracked.mesh, std::move(presence), true}, steps,
+                             quantised, IntraUse::reference);
     if (!out) return out;
     const auto& before = work.reference->origin;
     out->origin.fit = least_of(std::move(out->origin.fit), before.fit);
@@ -206,6 +277,7 @@ TrackedMotion chosen_motion(const TrackedWork& work, const NodeRegistration& reg
     frame.access = coded.of_reference;
     frame.packets.push_back(std::move(coded.packet));
     frame.decoded = std::move(coded.encoded.mesh);
+    frame.presence = coded.encoded.state.presence;
     frame.captured = counts_of(work.captured.mesh);
     frame.shares = coded.encoded.runs.shares;
     out.steps = coded.steps;
@@ -217,6 +289,8 @@ TrackedMotion chosen_motion(const TrackedWork& work, const NodeRegistration& reg
     history.last = registered.motion;
     history.state = std::move(coded.encoded.state);
     history.targets = std::move(coded.encoded.targets);
+    history.presence = std::move(coded.encoded.presence);
+    history.present_before_last = before.presence.shown;
     history.best_fit = best_fit;
     return out;
 }
@@ -257,6 +331,10 @@ Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const No
     frame.renewed =
         vertices > 0 ? static_cast<double>(vertices - patched->stays.size()) / static_cast<double>(vertices) : 0;
     frame.decoded = std::move(patched->mesh);
+    if (by_nodes.has_presence) {
+        frame.presence = presence_of_patched(tracked.state.presence, patched->stays, vertices);
+        out.presence = on_new_reference(tracked.presence, patched->stays, vertices);
+    }
     frame.captured = captured;
     frame.packets.push_back(frame_packet(PacketKind::patched, payload));
     if (denoises(work.configuration))
@@ -272,8 +350,12 @@ Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const No
     origin.colours = colours_at(work, frame.decoded);
     clock.done("patch coding");
     std::vector<std::uint32_t> near(vertices, OrientedPoints::no_point);
-    for (std::size_t i = 0; i < patched->stays.size(); ++i) near[i] = tracked.near[patched->stays[i]];
-    origin.fit = fit_of(work, frame.decoded, origin.edge, near, {});
+    std::vector<std::uint8_t> seen(tracked.seen.empty() ? 0 : vertices, 1);
+    for (std::size_t i = 0; i < patched->stays.size(); ++i) {
+        near[i] = tracked.near[patched->stays[i]];
+        if (!seen.empty()) seen[i] = tracked.seen[patched->stays[i]];
+    }
+    origin.fit = fit_of(work, frame.decoded, origin.edge, {.near = near, .seen = seen});
     return std::optional(std::move(out));
 }
 

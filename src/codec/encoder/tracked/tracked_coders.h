@@ -20,8 +20,8 @@ SimplifiedReferenceOptions simplification_options(const Configuration& configura
 Result<TrackedIntra> code_intra(const TrackedWork& work, const FrameSteps& steps);
 Result<TrackedIntra> code_unreferred_intra(const TrackedWork& work, const FrameSteps& steps);
 // An I-frame of the tracked mesh instead of the capture: who starts here, or has lost something, gets what the others
-// see, and these see no change. tracked: the T-frame's mesh.
-Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps, const LatticeMesh& tracked);
+// see, and these see no change. What was not seen for long is left out. tracked: the T-frame.
+Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps, const EncodedTrackedFrame& tracked);
 
 // A T-frame before it is chosen.
 struct CodedMotion {

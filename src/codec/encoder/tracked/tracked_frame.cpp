@@ -6,6 +6,7 @@
 #include "codec/encoder/lattice_motion.h"
 #include "codec/encoder/tracked/captured_surface.h"
 #include "codec/encoder/tracked/node_motion.h"
+#include "codec/tracked/presence.h"
 #include "core/parallel.h"
 #include "core/stage_clock.h"
 #include "surface/limb_starts.h"
@@ -62,7 +63,7 @@ void subtract(std::vector<std::int32_t>& values, const std::vector<std::int32_t>
 }  // namespace
 
 TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, const TrackedDecisions& decisions,
-                               std::size_t least_run) {
+                               const PresenceToWrite* presence, std::size_t least_run) {
     TrackedRuns out;
     std::vector<std::uint8_t> colour_run;
     if (decisions.colour) colour_run = decisions.colour->run();
@@ -72,6 +73,10 @@ TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, cons
     write_tracked_head(run, head, known);
     TrackedRunEnds ends;
     ends.head = run.position();
+    if (presence) {
+        write_presence(run, presence->around, presence->before, presence->presence);
+        ends.presence = run.position();
+    }
     decisions.motion.write(run);
     ends.motion = run.position();
     decisions.displacement.write(run);
@@ -80,7 +85,8 @@ TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, cons
     ends.colour = run.position();
     out.payload = run.finish();
     // The four bytes that are read ahead of the head must not be the colours'.
-    if (!colour_run.empty()) out.payload.resize(std::max(out.payload.size(), ends.head + 4));
+    if (!colour_run.empty())
+        out.payload.resize(std::max(out.payload.size(), std::max(ends.head, ends.presence) + 4));
     out.payload.insert(out.payload.end(), colour_run.begin(), colour_run.end());
     out.shares = layer_shares(ends, out.payload.size(), colour_run.size());
     return out;
@@ -215,6 +221,30 @@ void denoise(const TargetFilterOptions& how, const FrameSource& source, const Ta
     subtract(out.noise.targets.colours, targets.colours);
 }
 
+// What is there; where motion alone is coded, what was before.
+void judge(const FrameSource& source, const MovedSurface& moved, EncodedTrackedFrame& out) {
+    const auto& [captured, surface, reference, registered, before, options] = source;
+    if (!reference.has_presence) return;
+    const std::size_t vertices = moved.positions.size();
+    if (!options.presence.empty()) {
+        out.state.presence.assign(options.presence.begin(), options.presence.end());
+        return;
+    }
+    const PresenceHistory none;
+    const auto& history = options.presence_before ? *options.presence_before : none;
+    if (out.seen.empty()) {
+        out.presence = history;
+        out.state.presence = history.shown.empty() ? reference.presence : history.shown;
+        out.state.presence.resize(vertices, 1);
+        out.seen = out.state.presence;
+        return;
+    }
+    out.presence = judge_presence(out.seen,
+                                  {moved.positions, reference.mesh.triangles, reference.around, reference.presence},
+                                  history, options.presence_options);
+    out.state.presence = out.presence.shown;
+}
+
 struct CodedFields {
     EncodedField displacement;
     std::optional<EncodedField> colours;  // none where the reference has no colours
@@ -274,10 +304,12 @@ void finish(const FrameSource& source, const NodeMotionSteps& steps, EncodedNode
         out.state.colour = std::move(fields.colours->history);
         head.colour = fields.colours->steps;
     }
+    const PresenceToWrite presence{reference.around, before ? before->presence : reference.presence,
+                                   out.state.presence};
     out.runs = write_tracked_runs(
         head, {before ? &before->head : nullptr, reference.captured, fields.colours.has_value()},
         {motion.decisions, fields.displacement.decisions, fields.colours ? &fields.colours->decisions : nullptr},
-        least_run);
+        reference.has_presence ? &presence : nullptr, least_run);
 }
 
 }  // namespace
@@ -295,7 +327,9 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     moved.normals = vertex_normals(moved.positions, reference.mesh.triangles);
     auto targets = targets_of(source, moved);
     out.near = std::move(targets.near);
+    out.seen = std::move(targets.seen);
     clock.done("targets");
+    judge(source, moved, out);
     if (options.denoise) {
         denoise(*options.denoise, source, targets_before, targets, out);
         clock.done("denoising");

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "codec/encoder/tracked/presence_judge.h"
 #include "codec/encoder/tracked/target_filter.h"
 #include "codec/encoder/tracking_numbers.h"
 #include "codec/tracked/tracked_frame.h"
@@ -41,6 +42,10 @@ struct TrackedFrameOptions {
     TargetSamples target_samples = TargetSamples::middles;
     std::span<const std::uint32_t> near = {};  // EncodedTrackedFrame::near of another attempt, where searches begin;
                                                // none: they begin at the registration's matches
+    // Where the stream tells what is there: how that is judged, from the frame before; or what it is to be.
+    PresenceOptions presence_options;
+    const PresenceHistory* presence_before = nullptr;
+    std::span<const std::uint8_t> presence = {};
     bool motion_alone = false;  // displacement and colours stay as predicted: the smallest frame possible
     Threads threads = {};
 };
@@ -76,15 +81,22 @@ struct TrackedDecisions {
     const DecisionLog &motion, &displacement;
     const DecisionLog* colour = nullptr;  // null where the reference has no colours
 };
-// The payload of decisions. least_run: bytes from which on the colours are a run of their own; sets head.colour_run.
+// What is there, as it is coded.
+struct PresenceToWrite {
+    const VerticesAround& around;
+    std::span<const std::uint8_t> before, presence;
+};
+// The payload of decisions. presence: null in streams that do not tell it. least_run: bytes from which on the colours are a run of their own; sets head.colour_run.
 TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, const TrackedDecisions& decisions,
-                               std::size_t least_run);
+                               const PresenceToWrite* presence, std::size_t least_run);
 
 struct EncodedTrackedFrame {
     TrackedRuns runs;
     LatticeMesh mesh;  // the mesh that the decoder will have
     TrackedState state;
     TargetHistory targets;            // empty without filtering
+    PresenceHistory presence;         // empty in streams that do not tell it, and where it was given
+    std::vector<std::uint8_t> seen;   // TrackedTargets::seen
     RemovedNoise noise;               // empty unless it was to be told
     std::vector<std::uint32_t> near;  // of each vertex, the captured vertex beside it: TrackedTargets::near
 };

@@ -40,7 +40,8 @@ void register_next(const TrackedWork& work, const Tracking& tracking, const Trac
     if (assumed.nodes && !tracking.lost && can_be_moved(work.sequence, next.captured.mesh))
         next.ahead.registered =
             register_frame(work.configuration, *work.reference, *next.ahead.surface, next.captured,
-                           {assumed.nodes->motion, work.sequence.history.last, {}, {}}, stages, &tracking.lost);
+                           {assumed.nodes->motion, work.sequence.history.last, {}, {}}, present(work.sequence, true),
+                           stages, &tracking.lost);
 }
 
 }  // namespace
@@ -77,7 +78,8 @@ Result<std::shared_ptr<TrackedReference>> reference_of(const TrackedWork& work, 
     // a start for the motion of the nodes.
     const bool referred_to = !configuration.intra_only() || configuration.options.rate.bits_per_second > 0;
     auto decoded = make_reference(
-        configuration.header, {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured},
+        configuration.header,
+        {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured, frame.presence},
         frame.decoded, std::move(pose),
         {.bones = referred_to && configuration.header.has_skeleton, .nodes = referred_to}, configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
@@ -106,6 +108,7 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedIntra& intra) {
     out.next_frame = before.next_frame + 1;
     out.history.best_fit = intra.best_fit;
     out.history.targets = on_new_reference(before.history.targets, {}, 0, {});
+    out.history.presence = std::move(intra.presence);
     out.reference = std::move(*reference);
     return out;
 }
@@ -124,6 +127,7 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedPatch& patch) {
     out.next_frame = work.sequence.next_frame + 1;
     out.history.best_fit = patch.best_fit;
     out.history.targets = std::move(patch.targets);
+    out.history.presence = std::move(patch.presence);
     if (!patch.before_last.empty())
         out.history.gone_on = moved_on(before.deformable, patch.before_last, patch.last, in_use.deformable.handles);
     out.reference = std::move(*reference);
@@ -165,7 +169,8 @@ Result<TrackedHandout> hold(TrackedStrategy& strategy, TrackedWork& work, Tracki
     auto& held = strategy.held;
     const bool place_to_start = motion.frame.access && (strategy.anchor || !held.empty());
     held.push_back({work.sequence.next_frame, work.captured.timestamp_us, std::move(work.captured.mesh),
-                    std::move(work.surface), std::move(*tracking.registered), motion.steps, std::move(motion.noise)});
+                    std::move(work.surface), std::move(*tracking.registered), motion.steps, std::move(motion.noise),
+                    motion.frame.presence});
     const std::span<const HeldFrame> all = held;
     TrackedHandout out;
     if (place_to_start) {

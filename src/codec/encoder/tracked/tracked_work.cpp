@@ -54,22 +54,30 @@ SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame&
 
 NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
                                 const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
-                                std::vector<StageTime>& stages, const std::atomic<bool>* in_vain) {
+                                std::span<const std::uint8_t> presence, std::vector<StageTime>& stages,
+                                const std::atomic<bool>* in_vain) {
     StageClock clock(stages);
     const auto skeletal = skeletal_node_motion(configuration, reference.decoded, captured.pose);
     starts.skeletal = skeletal;
     auto options = deformation_options(configuration, tracking_effort(captured.effort));
     options.in_vain = in_vain;
+    options.present = presence;
     auto out = register_nodes(reference.deformable, surface, starts, options);
     clock.done("registration");
     return out;
+}
+
+std::span<const std::uint8_t> present(const TrackedSequence& sequence, bool behind) {
+    const auto& history = sequence.history;
+    const auto& there = behind ? history.presence.shown : history.present_before_last;
+    return there.empty() ? sequence.reference->decoded.presence : there;
 }
 
 const NodeRegistration& register_once(const TrackedWork& work, Tracking& tracking) {
     if (!tracking.registered) {
         const auto& history = work.sequence.history;
         tracking.registered = register_frame(work.configuration, *work.reference, work.surface, work.captured,
-                                             {history.last, history.before_last, history.gone_on, {}}, work.stages);
+                                             {history.last, history.before_last, history.gone_on, {}}, present(work.sequence), work.stages);
     }
     return *tracking.registered;
 }
@@ -79,22 +87,24 @@ FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered,
     const auto& history = work.sequence.history;
     const auto skeletal = skeletal_node_motion(work.configuration, work.reference->decoded, work.captured.pose);
     FoundLimbs out{std::move(registered)};
+    auto options = deformation_options(work.configuration, work.effort);
+    options.present = present(work.sequence);
     out.any = follow_lost_limbs(work.reference->deformable, work.surface,
-                                {history.last, history.before_last, history.gone_on, skeletal},
-                                deformation_options(work.configuration, work.effort), out.registered);
+                                {history.last, history.before_last, history.gone_on, skeletal}, options,
+                                out.registered);
     clock.done("registration");
     return out;
 }
 
-TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double reference_edge,
-                  std::span<const std::uint32_t> near, std::span<const double> intra_squared) {
+TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double reference_edge, const KnownOfFit& known) {
     StageClock clock(work.stages);
     TrackedFitOptions options;
     options.stray = std::max(tracking_numbers.stray_in_edges * LatticeUnits(reference_edge), LatticeUnits(1));
     options.reach = std::max(work.configuration.scale.on_lattice(tracking_numbers.fit_reach), options.stray);
     options.region = region_side(work.configuration);
+    options.seen = known.seen;
     options.threads = work.configuration.threads;
-    auto out = measure_tracked_fit(work.surface, decoded, near, intra_squared, options);
+    auto out = measure_tracked_fit(work.surface, decoded, known.near, known.intra_squared, options);
     clock.done("fit of the tracking");
     return out;
 }
@@ -129,6 +139,7 @@ LatticeUnits region_side(const Configuration& configuration) {
 DeformationOptions deformation_options(const Configuration& configuration, const TrackingEffort& effort) {
     DeformationOptions out;
     out.scale = configuration.scale;
+    out.open = configuration.tells_presence();
     out.threads = configuration.threads;
     return with_effort(out, effort);
 }

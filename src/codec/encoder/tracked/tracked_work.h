@@ -47,6 +47,8 @@ struct MotionHistory {
     std::vector<RigidMotion> last, before_last;  // of each node, as registered; empty if there is none
     TrackedState state;                          // of the last one
     TargetHistory targets;                       // what filtering left of the last one
+    PresenceHistory presence;                    // what judging left of it, in streams that tell what is there
+    Presence present_before_last;                // what was there one frame before; none: as of the reference
     std::vector<RigidMotion> gone_on;  // behind a TP-frame: a start for each node of the new reference, from how the
                                        // surface there moved on the old one; else empty
     LatticeUnits best_fit;             // RMS of the best so far; 0: none yet
@@ -86,6 +88,7 @@ struct TrackedIntra {
     ReferenceOrigin origin;
     std::int32_t step = 1;  // Reference::step
     CodedPose pose;
+    PresenceHistory presence = {};  // MotionHistory::presence, of a renewed one
     LatticeUnits best_fit;  // MotionHistory::best_fit, which lasts as long as tracking does; 0: it begins anew
 };
 // A TP-frame, which becomes the reference.
@@ -95,6 +98,7 @@ struct TrackedPatch {
     CodedPose pose;
     KeptNodes kept;                              // what it takes over of the reference before
     TargetHistory targets;                       // on the reference that it becomes
+    PresenceHistory presence;                    // likewise
     std::vector<RigidMotion> before_last, last;  // of each node of the reference before, up to this frame
     LatticeUnits best_fit;                       // as of an I-frame
 };
@@ -133,10 +137,16 @@ inline CodedFrame& coded_frame(TrackedWork::Frame& frame) {
 SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame& captured,
                         std::vector<StageTime>& stages);
 
-// Registers the reference's nodes to a captured surface. starts: but for the skeleton's. in_vain: may end it early.
+// What of the reference is known to be there when a frame is registered: since that may begin while the frame before is
+// coded, what was there before that one. One per vertex, or none: all is. behind: of the frame behind the next one.
+std::span<const std::uint8_t> present(const TrackedSequence& sequence, bool behind = false);
+
+// Registers the reference's nodes to a captured surface. starts: but for the skeleton's. presence: what of the reference
+// was seen lately. in_vain: may end it early.
 NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
                                 const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
-                                std::vector<StageTime>& stages, const std::atomic<bool>* in_vain = nullptr);
+                                std::span<const std::uint8_t> presence, std::vector<StageTime>& stages,
+                                const std::atomic<bool>* in_vain = nullptr);
 // The same of the frame that is coded, unless it is registered already.
 const NodeRegistration& register_once(const TrackedWork& work, Tracking& tracking);
 
@@ -147,9 +157,14 @@ struct FoundLimbs {
 };
 FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered, std::vector<StageTime>& stages);
 
-// Whether a decoded mesh still represents the captured one. near, intra_squared: see measure_tracked_fit().
-TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double reference_edge,
-                  std::span<const std::uint32_t> near, std::span<const double> intra_squared);
+// What is known of a decoded mesh: see measure_tracked_fit().
+struct KnownOfFit {
+    std::span<const std::uint32_t> near = {};
+    std::span<const double> intra_squared = {};
+    std::span<const std::uint8_t> seen = {};
+};
+// Whether a decoded mesh still represents the captured one.
+TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double reference_edge, const KnownOfFit& known);
 
 // What is seen of CapturedFrame::colours at the vertices of a decoded mesh; none without those.
 std::vector<Colour> colours_at(const TrackedWork& work, const LatticeMesh& decoded);

@@ -1,0 +1,79 @@
+#include "surface/open_border.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+namespace htvm::internal {
+namespace {
+
+constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+std::uint64_t scattered(std::uint64_t x) {
+    x ^= x >> 31;
+    x *= 0x9E3779B97F4A7C15u;
+    return x ^ (x >> 29);
+}
+
+// Of each vertex the first one at its place.
+std::vector<std::uint32_t> places_of(std::span<const Vector3f> positions) {
+    const std::size_t slots = std::bit_ceil(2 * positions.size() + 2);
+    std::vector<std::uint32_t> table(slots, none), out(positions.size());
+    for (std::uint32_t v = 0; v < positions.size(); ++v) {
+        std::uint64_t hash = 0;
+        for (const float c : positions[v]) hash = scattered(hash * 3 + std::bit_cast<std::uint32_t>(c + 0.0F));
+        std::size_t slot = hash & (slots - 1);
+        while (table[slot] != none && positions[table[slot]] != positions[v]) slot = (slot + 1) & (slots - 1);
+        if (table[slot] == none) table[slot] = v;
+        out[v] = table[slot];
+    }
+    return out;
+}
+
+// The vertices on a border, by place. Around a vertex inside, each side that leads away from it in one triangle leads
+// back in another, so what is added for the one is taken off for the other.
+std::vector<std::uint8_t> on_border(std::span<const Triangle> triangles, std::span<const std::uint32_t> place) {
+    std::vector<std::uint64_t> left(place.size(), 0);
+    for (const auto& t : triangles) {
+        const Triangle at{place[t[0]], place[t[1]], place[t[2]]};
+        if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
+        for (std::size_t i = 0; i < 3; ++i)
+            left[at[i]] += scattered(at[(i + 1) % 3] + 1u) - scattered(at[(i + 2) % 3] + 1u);
+    }
+    std::vector<std::uint8_t> out(place.size());
+    for (std::size_t v = 0; v < out.size(); ++v) out[v] = left[place[v]] != 0 ? 1 : 0;
+    return out;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> edges_from_border(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
+    const auto place = places_of(positions);
+    const auto border = on_border(triangles, place);
+    std::vector<std::uint8_t> out(positions.size(), far_from_border);
+    for (std::size_t v = 0; v < out.size(); ++v)
+        if (border[v] != 0) out[place[v]] = 0;
+    for (std::uint8_t ring = 0; ring + 1 < far_from_border; ++ring)
+        for (const auto& t : triangles) {
+            const Triangle at{place[t[0]], place[t[1]], place[t[2]]};
+            if (out[at[0]] != ring && out[at[1]] != ring && out[at[2]] != ring) continue;
+            for (const auto v : at) out[v] = std::min<std::uint8_t>(out[v], ring + 1);
+        }
+    for (std::size_t v = 0; v < out.size(); ++v) out[v] = out[place[v]];
+    return out;
+}
+
+double share_on_border(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
+    const auto border = on_border(triangles, places_of(positions));
+    std::vector<std::uint8_t> used(positions.size(), 0);
+    for (const auto& t : triangles)
+        for (const auto v : t) used[v] = 1;
+    std::size_t all = 0, open = 0;
+    for (std::size_t v = 0; v < used.size(); ++v) {
+        all += used[v];
+        open += used[v] != 0 && border[v] != 0 ? 1 : 0;
+    }
+    return all == 0 ? 0 : static_cast<double>(open) / static_cast<double>(all);
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,28 @@
+// Where a captured surface ends. A depth camera's has a border wherever something stood in the way: beyond it nothing
+// is known, and a point that lies nearest to it says nothing of the surface. Encoder only.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/geometry.h"
+#include "htvm/mesh.hpp"
+
+namespace htvm::internal {
+
+inline constexpr std::uint8_t far_from_border = 3;
+
+// Of each vertex, how many edges lead to the nearest border, at most far_from_border; that of vertices of no triangle.
+// Vertices at the same place count as one, so the seams of a texture are no borders. Where triangles face against each
+// other there is a border between them. Linear in vertices and triangles.
+std::vector<std::uint8_t> edges_from_border(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
+
+// The share of the vertices that lie on a border, of those that have triangles: next to 0 for captures from all sides,
+// 0.03 to 0.2 for views of depth cameras.
+double share_on_border(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
+
+// A capture with more on its border is one of surface that comes and goes.
+inline constexpr double open_from_share = 0.02;
+
+}  // namespace htvm::internal
