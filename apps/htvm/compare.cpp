@@ -37,11 +37,15 @@ void choose_metrics(ComparisonRequest& options) {
     }
     c.render.colours = !options.shading.grey;
     c.render.shading = options.shading.shading.value_or(Shading::smooth);
-    if (options.only.empty()) return;
+    if (options.only.empty()) {
+        options.coverage_if_open = !c.coverage;
+        return;
+    }
     const std::set<std::string> only(options.only.begin(), options.only.end());
     c.points = only.contains("m1");
     c.surface = only.contains("m2");
     c.regions = only.contains("regions");
+    c.coverage = c.coverage || only.contains("coverage");
     c.texcoords = only.contains("texcoords");
     c.cloud = only.contains("d1") || only.contains("d2");
     c.pictures = c.pictures && only.contains("m3");
@@ -134,15 +138,24 @@ void add_measurements(CLI::App& command, ComparisonRequest& o) {
     command.option_defaults()->group(heading::measurements);
     command
         .add_option("--only", o.only,
-                    "Measure only some of m1, m2, regions, texcoords, d1, d2, m3, flicker, topology, separated by\n"
-                    "commas")
+                    "Measure only some of m1, m2, regions, coverage, texcoords, d1, d2, m3, flicker, topology,\n"
+                    "separated by commas")
         ->delimiter(',')
-        ->check(CLI::IsMember({"m1", "m2", "regions", "texcoords", "d1", "d2", "m3", "flicker", "topology"}))
+        ->check(
+            CLI::IsMember({"m1", "m2", "regions", "coverage", "texcoords", "d1", "d2", "m3", "flicker", "topology"}))
         ->option_text("LIST");
+    command
+        .add_option("--covered-within", o.compare.coverage_options.within,
+                    "Measure coverage, and take a place for covered if the other surface lies within so many mm")
+        ->check(CLI::Range(0.001, 1e6))
+        ->capture_default_str()
+        ->type_name("MM")
+        ->each([&o](const std::string&) { o.compare.coverage = true; });
     command
         .add_option("--truth", o.truth,
                     "What 'htvm synth --truth' wrote beside the originals: measures how far the decoded surface\n"
-                    "slides along the true one while its triangles stay the same, by frames since they were new")
+                    "slides along the true one while its triangles stay the same, by frames since they were new; with\n"
+                    "coverage also how much of the true surface either shows, and how near they are to it")
         ->type_name("FOLDER");
     command.add_option("--samples", o.compare.surface_options.samples,
                        "Samples for M2, in each direction (default: 10 times the triangles, like METRO)");
@@ -191,6 +204,9 @@ constexpr const char* what_is_measured =
     "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
     "  regions  the worst region of the surface, a ball of 10 cm: RMS distance there, in the worse direction; of\n"
     "      frames their median, 99th percentile and largest, of a stream's I-frames and its others apart\n"
+    "  coverage  by default where the capture is open, as depth cameras' are: the share of the captured surface\n"
+    "      within 5 mm of what is shown, and of the shown surface within it of the captured; M2 and worst regions\n"
+    "      over what is covered; and the area that appears and vanishes from frame to frame, in both\n"
     "  texture coordinates, at closest points of the surface; where they differ by more than 1/16 of the atlas "
     "they\n"
     "      are elsewhere in it, and counted by themselves\n"

@@ -7,7 +7,11 @@
 #include <utility>
 
 #include "command_line/terminal.h"
+#include "coverage_report.h"
 #include "io/output_file.h"
+#include "metrics/presence_change.h"
+#include "metrics/surface_border.h"
+#include "metrics/truth_coverage.h"
 
 namespace htvm::app {
 namespace {
@@ -43,49 +47,123 @@ Result<void> write_pictures(const ComparisonRequest& options, const TexturedMesh
     return {};
 }
 
-// The marks of a true surface (htvm synth --truth), as they go with the originals: by number, else in order.
-struct Marks {
+// Meshes of the truth (htvm synth --truth), as they go with the originals: by number, else in order.
+struct TrueMeshes {
     MeshSource source;
     std::vector<std::size_t> place_of;  // of each original; the number of frames: none
 };
 
-Result<Marks> open_marks(const ComparisonRequest& options, const MeshSource& original) {
-    auto source = open_meshes({(std::filesystem::path(options.truth) / "marks").string()},
-                              {LengthUnit::millimetre, "", options.limits, {}});
-    if (!source) return tl::unexpected(source.error());
-    Marks marks{std::move(*source), std::vector<std::size_t>(original.frames)};
-    const auto& numbers = marks.source.numbers;
-    const bool by_number = !original.numbers.empty() && !numbers.empty();
-    for (std::size_t k = 0; k < original.frames; ++k)
-        marks.place_of[k] =
-            by_number ? static_cast<std::size_t>(std::ranges::find(numbers, original.numbers[k]) - numbers.begin())
-                      : std::min(k, marks.source.frames);
-    return marks;
+std::filesystem::path part_of_truth(const ComparisonRequest& options, const char* name) {
+    return std::filesystem::path(options.truth) / name;
 }
 
-// original: its position, with that number.
-Result<FrameDrift> measure_drift(Marks& marks, DriftMeter& meter, std::size_t original, std::uint64_t number,
-                                 const Mesh& decoded) {
-    if (marks.place_of[original] == marks.source.frames)
+bool has_part_of_truth(const ComparisonRequest& options, const char* name) {
+    std::error_code error;
+    return !options.truth.empty() && std::filesystem::is_directory(part_of_truth(options, name), error);
+}
+
+Result<TrueMeshes> open_truth(const ComparisonRequest& options, const char* name, const MeshSource& original) {
+    auto source =
+        open_meshes({part_of_truth(options, name).string()}, {LengthUnit::millimetre, "", options.limits, {}});
+    if (!source) return tl::unexpected(source.error());
+    TrueMeshes out{std::move(*source), std::vector<std::size_t>(original.frames)};
+    const auto& numbers = out.source.numbers;
+    const bool by_number = !original.numbers.empty() && !numbers.empty();
+    for (std::size_t k = 0; k < original.frames; ++k)
+        out.place_of[k] =
+            by_number ? static_cast<std::size_t>(std::ranges::find(numbers, original.numbers[k]) - numbers.begin())
+                      : std::min(k, out.source.frames);
+    return out;
+}
+
+// Of the original at this position.
+Result<Mesh> true_mesh(TrueMeshes& truth, const MeshSource& original, std::size_t position) {
+    if (truth.place_of[position] == truth.source.frames)
         return fail(ErrorKind::bad_input,
-                    fmt::format("{} has no frame {}; is it the truth of these originals?", marks.source.name, number));
-    const auto mesh = marks.source.mesh_at(marks.source, marks.place_of[original]);
+                    fmt::format("{} has no frame {}; is it the truth of these originals?", truth.source.name,
+                                original.numbers.empty() ? position : original.numbers[position]));
+    auto mesh = truth.source.mesh_at(truth.source, truth.place_of[position]);
     if (!mesh) return tl::unexpected(mesh.error());
-    return meter.add(mesh->mesh, decoded);
+    return std::move(mesh->mesh);
+}
+
+// Whether a frame of the truth and of both sequences follows the one before.
+bool follows(const FramePair& pair, const std::optional<FramePair>& before) {
+    return before && pair.original == before->original + 1 && pair.decoded == before->decoded + 1;
+}
+
+// What the request leaves to the capture: whether it is so open that its errors are measured over what is covered.
+void decide_coverage(ComparisonRequest& options, const Mesh& first) {
+    const bool errors_alone =
+        !options.compare.coverage && !options.coverage_if_open && (options.compare.surface || options.compare.regions);
+    if (!options.coverage_if_open && !errors_alone) return;
+    if (!is_open(first)) return;
+    if (errors_alone) {
+        note("the capture is open: what lies beside its borders counts as an error; --only coverage tells them apart");
+        return;
+    }
+    options.compare.coverage = true;
+    note("the capture is open: coverage is measured, too, and the errors over what is covered");
+}
+
+// What coverage needs besides compare_frame.
+class CoverageMeasuring {
+public:
+    static Result<CoverageMeasuring> begin(const ComparisonRequest& options, const MeshSource& original) {
+        CoverageOptions chosen = options.compare.coverage_options;
+        chosen.threads = options.compare.threads;
+        CoverageMeasuring out(chosen);
+        if (!has_part_of_truth(options, "surface")) return out;
+        auto opened = open_truth(options, "surface", original);
+        if (!opened) return tl::unexpected(opened.error());
+        out.truth_ = std::move(*opened);
+        return out;
+    }
+    // The next frame; is_next: it follows the one before.
+    Result<void> add(const MeshSource& original, std::size_t position, const Mesh& captured, const Mesh& shown,
+                     bool is_next, CoverageFrames& frames) {
+        if (!is_next) presence_.begin_anew();
+        const auto change = presence_.add(captured, shown);
+        if (!change) return tl::unexpected(change.error());
+        frames.changes.push_back(*change);
+        if (!truth_) return {};
+        const auto truth = true_mesh(*truth_, original, position);
+        if (!truth) return tl::unexpected(truth.error());
+        if (const auto ok = check_measurable(*truth, "true surface"); !ok) return ok;
+        const auto found = truth_coverage(captured, shown, *truth, {}, options_);
+        if (!found) return tl::unexpected(found.error());
+        frames.truths.push_back(*found);
+        return {};
+    }
+
+private:
+    explicit CoverageMeasuring(const CoverageOptions& options) : options_(options), presence_(options) {}
+    CoverageOptions options_;
+    PresenceMeter presence_;
+    std::optional<TrueMeshes> truth_;
+};
+
+Result<FrameDrift> measure_drift(TrueMeshes& marks, DriftMeter& meter, const MeshSource& original, std::size_t position,
+                                 const Mesh& decoded) {
+    const auto mesh = true_mesh(marks, original, position);
+    if (!mesh) return tl::unexpected(mesh.error());
+    return meter.add(*mesh, decoded);
 }
 
 }  // namespace
 
-Result<Measured> measure(const ComparisonRequest& options, Sources& sources, const std::vector<FramePair>& pairs) {
+Result<Measured> measure(ComparisonRequest& options, Sources& sources, const std::vector<FramePair>& pairs) {
     auto& [original, decoded] = sources;
     Measured out;
-    std::optional<Marks> marks;
-    if (!options.truth.empty()) {
-        auto opened = open_marks(options, original);
+    std::optional<TrueMeshes> marks;
+    // A truth without marks says no drift.
+    if (has_part_of_truth(options, "marks") || (!options.truth.empty() && !has_part_of_truth(options, "surface"))) {
+        auto opened = open_truth(options, "marks", original);
         if (!opened) return tl::unexpected(opened.error());
         marks = std::move(*opened);
     }
     FlickerMeter flicker(flicker_options(options.compare));
+    std::optional<CoverageMeasuring> coverage;
     std::optional<FramePair> before;
     Progress progress("compare", pairs.size());
     for (const auto& pair : pairs) {
@@ -96,7 +174,10 @@ Result<Measured> measure(const ComparisonRequest& options, Sources& sources, con
         // Triangles that keep their texture coordinates show the original's image.
         if (second->mesh.colours.empty() && !second->texture && !second->mesh.texcoords.empty())
             second->texture = first->texture;
-        if (out.frames.empty()) warn_of_sizes(sources, first->mesh, second->mesh);
+        if (out.frames.empty()) {
+            warn_of_sizes(sources, first->mesh, second->mesh);
+            decide_coverage(options, first->mesh);
+        }
         auto comparison = compare_frame(*first, *second, options.compare);
         if (!comparison)
             return fail(comparison.error().kind,
@@ -106,18 +187,29 @@ Result<Measured> measure(const ComparisonRequest& options, Sources& sources, con
         out.places.push_back(pair.original);
         out.kinds.push_back(decoded.is_stream ? std::optional(decoded.kinds[pair.decoded]) : std::nullopt);
         if (marks) {
-            const auto number = original.numbers.empty() ? pair.original : original.numbers[pair.original];
-            const auto drift = measure_drift(*marks, out.drift, pair.original, number, second->mesh);
+            const auto drift = measure_drift(*marks, out.drift, original, pair.original, second->mesh);
             if (!drift) return tl::unexpected(drift.error());
             out.drifts.push_back(*drift);
+        }
+        const bool is_next = follows(pair, before);
+        before = pair;
+        if (options.compare.coverage) {
+            add_region(out.coverage, comparison->coverage, out.kinds.back());
+            if (!coverage) {
+                auto begun = CoverageMeasuring::begin(options, original);
+                if (!begun) return tl::unexpected(begun.error());
+                coverage.emplace(std::move(*begun));
+            }
+            if (const auto ok =
+                    coverage->add(original, pair.original, first->mesh, second->mesh, is_next, out.coverage);
+                !ok)
+                return tl::unexpected(ok.error());
         }
         if (!options.pictures.empty())
             if (const auto ok = write_pictures(options, *first, *second, pair.original); !ok)
                 return tl::unexpected(ok.error());
         if (options.flicker) {
-            if (before && (pair.original != before->original + 1 || pair.decoded != before->decoded + 1))
-                flicker.begin_anew();
-            before = pair;
+            if (!is_next) flicker.begin_anew();
             auto change = flicker.add(std::move(*first), std::move(*second));
             if (!change) return tl::unexpected(change.error());
             out.flickers.push_back({*change, {}});

@@ -121,10 +121,6 @@ std::vector<Column> columns(const FrameComparison& frame, const CompareOptions& 
     return out;
 }
 
-nlohmann::json distances_json(const SurfaceDistances& d) {
-    return {{"rms_mm", d.rms}, {"mean_mm", d.mean}, {"largest_mm", d.largest}, {"samples", d.samples}};
-}
-
 }  // namespace
 
 std::string comparison_table(const SequenceComparison& sums, const CompareOptions& options, double peak_mm) {
@@ -162,6 +158,10 @@ std::string comparison_table(const SequenceComparison& sums, const CompareOption
     if (options.pictures) out += picture_rows(sums, s, options);
     if (options.topology) out += topology_rows(sums);
     return out;
+}
+
+nlohmann::json distances_json(const SurfaceDistances& d) {
+    return {{"rms_mm", d.rms}, {"mean_mm", d.mean}, {"largest_mm", d.largest}, {"samples", d.samples}};
 }
 
 nlohmann::json topology_json(const Topology& t) {

@@ -16,6 +16,7 @@ std::string single(const std::string& what, double value, int digits);
 // A table of everything that `options` asked for.
 std::string comparison_table(const SequenceComparison& sums, const CompareOptions& options, double peak_mm);
 
+nlohmann::json distances_json(const SurfaceDistances& d);
 nlohmann::json topology_json(const Topology& t);
 // Only what `options` asked for. An infinite PSNR, without any difference, becomes null.
 nlohmann::json summary_json(const ComparisonSummary& s, const CompareOptions& options);

@@ -6,6 +6,7 @@
 
 #include "command_line/terminal.h"
 #include "comparison_output.h"
+#include "coverage_report.h"
 #include "flicker_report.h"
 #include "io/output_file.h"
 #include "region_report.h"
@@ -16,6 +17,7 @@ Result<void> write_csv(const ComparisonRequest& options, const Measured& measure
     std::string text = csv_header(options.compare);
     if (!measured.flickers.empty()) text += ",kind,flicker_lit,flicker_unlit,flicker_still_lit,flicker_still_unlit";
     if (!measured.drifts.empty()) text += ",drift_age,drift_mean_mm,drift_p95_mm";
+    if (options.compare.coverage) text += coverage_names(measured.coverage);
     text += '\n';
     for (std::size_t i = 0; i < measured.frames.size(); ++i) {
         text += csv_line(measured.places[i], measured.frames[i], options.compare, peak_mm);
@@ -24,6 +26,7 @@ Result<void> write_csv(const ComparisonRequest& options, const Measured& measure
             const FrameDrift& drift = measured.drifts[i];
             text += fmt::format(",{},{:.8g},{:.8g}", drift.age, drift.mean_mm, drift.p95_mm);
         }
+        if (options.compare.coverage) text += coverage_cells(measured.frames[i].coverage, measured.coverage, i);
         text += '\n';
     }
     if (options.csv == "-") {
@@ -34,6 +37,12 @@ Result<void> write_csv(const ComparisonRequest& options, const Measured& measure
 }
 
 namespace {
+
+WorstRegions regions_of(const Measured& measured) {
+    WorstRegions out{{}, measured.kinds};
+    for (const auto& frame : measured.frames) out.worst_mm.push_back(frame.region.worst_mm);
+    return out;
+}
 
 nlohmann::json drift_json(const FrameDrift& drift) {
     return {{"age", drift.age}, {"marks", drift.marks}, {"mean_mm", drift.mean_mm}, {"p95_mm", drift.p95_mm}};
@@ -67,6 +76,7 @@ nlohmann::json as_json(const ComparisonRequest& options, const Measured& measure
         line["frame"] = measured.places[i];
         if (options.compare.regions)
             line["worst_region"] = {{"rms_mm", frame.region.worst_mm}, {"centre_mm", frame.region.centre}};
+        if (options.compare.coverage) line["coverage"] = coverage_json(frame.coverage, measured.coverage, i);
         line["original_vertices"] = frame.original_vertices;
         line["decoded_vertices"] = frame.decoded_vertices;
         if (options.compare.topology) {
@@ -83,8 +93,11 @@ nlohmann::json as_json(const ComparisonRequest& options, const Measured& measure
     }
     nlohmann::json out = {
         {"original", options.originals.front()}, {"decoded", options.decoded}, {"frames", std::move(frames)}};
-    out["sequence"] = summary_json(summarise(measured.sums, peak_mm), options.compare);
-    if (options.compare.regions) out["sequence"]["worst_region"] = regions_json(measured.frames, measured.kinds);
+    const ComparisonSummary summary = summarise(measured.sums, peak_mm);
+    out["sequence"] = summary_json(summary, options.compare);
+    if (options.compare.regions) out["sequence"]["worst_region"] = regions_json(regions_of(measured));
+    if (options.compare.coverage)
+        out["sequence"]["coverage"] = coverage_json(summary, options.compare, measured.coverage);
     if (!measured.drifts.empty()) {
         auto& drift = out["sequence"]["drift"] = drift_json(measured.drift.overall());
         drift.erase("age");
@@ -96,7 +109,9 @@ nlohmann::json as_json(const ComparisonRequest& options, const Measured& measure
 
 std::string as_table(const ComparisonRequest& options, const Measured& measured) {
     std::string out = comparison_table(measured.sums, options.compare, options.peak_mm);
-    if (options.compare.regions) out += region_rows(measured.frames, measured.kinds);
+    if (options.compare.regions) out += region_rows("worst region of 10 cm, RMS mm", regions_of(measured));
+    if (options.compare.coverage)
+        out += coverage_rows(summarise(measured.sums, options.peak_mm), options.compare, measured.coverage);
     if (!measured.drifts.empty()) out += drift_rows(measured.drift);
     if (has_flicker(measured.flickers)) out += flicker_rows(measured.flickers, options.compare.render.shading);
     return out;

@@ -23,6 +23,7 @@ struct ComparisonRequest {
     std::string timestamps;
     std::vector<std::string> ignored;  // globs: files that are no frames
     std::string truth;                 // folder; empty: no drift
+    bool coverage_if_open = false;     // measure coverage if the first original is open
     std::size_t frames = 0;            // 0: all
     std::vector<std::string> only;
     CompareOptions compare;

@@ -3,9 +3,11 @@
 #include <fmt/core.h>
 
 #include <array>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "comparison_output.h"
+#include "metrics/region_error.h"
 
 namespace htvm::app {
 namespace {
@@ -23,22 +25,19 @@ constexpr std::array region_groups = {
                 [](std::optional<FrameType> kind) { return kind && kind != FrameType::intra; }},
 };
 
-RegionErrorSummary worst_regions(const std::vector<FrameComparison>& frames,
-                                 const std::vector<std::optional<FrameType>>& kinds, const RegionGroup& group) {
+RegionErrorSummary worst_regions(const WorstRegions& frames, const RegionGroup& group) {
     std::vector<double> worst;
-    for (std::size_t i = 0; i < frames.size(); ++i)
-        if (group.has(kinds[i])) worst.push_back(frames[i].region.worst_mm);
+    for (std::size_t i = 0; i < frames.worst_mm.size(); ++i)
+        if (!std::isnan(frames.worst_mm[i]) && group.has(frames.kinds[i])) worst.push_back(frames.worst_mm[i]);
     return summarise(std::move(worst));
 }
 
 }  // namespace
 
-std::string region_rows(const std::vector<FrameComparison>& frames,
-                        const std::vector<std::optional<FrameType>>& kinds) {
-    std::string out =
-        fmt::format("\n  {:<34}{:>12}{:>12}{:>12}\n", "worst region of 10 cm, RMS mm", "median", "99 %", "largest");
+std::string region_rows(const char* title, const WorstRegions& frames) {
+    std::string out = fmt::format("\n  {:<34}{:>12}{:>12}{:>12}\n", title, "median", "99 %", "largest");
     for (const auto& group : region_groups) {
-        const auto sums = worst_regions(frames, kinds, group);
+        const auto sums = worst_regions(frames, group);
         if (sums.frames == 0) continue;
         out +=
             row(fmt::format("  of {} ({})", group.name, sums.frames), sums.median_mm, sums.p99_mm, sums.largest_mm, 3);
@@ -46,11 +45,10 @@ std::string region_rows(const std::vector<FrameComparison>& frames,
     return out;
 }
 
-nlohmann::json regions_json(const std::vector<FrameComparison>& frames,
-                            const std::vector<std::optional<FrameType>>& kinds) {
+nlohmann::json regions_json(const WorstRegions& frames) {
     nlohmann::json out;
     for (const auto& group : region_groups) {
-        const auto sums = worst_regions(frames, kinds, group);
+        const auto sums = worst_regions(frames, group);
         if (sums.frames == 0) continue;
         out[group.key] = {{"frames", sums.frames},
                           {"median_mm", sums.median_mm},

@@ -7,13 +7,16 @@
 #include <vector>
 
 #include "htvm/frame.hpp"
-#include "metrics/compare.h"
 
 namespace htvm::app {
 
-// kinds: of each frame, if it is known.
-std::string region_rows(const std::vector<FrameComparison>& frames, const std::vector<std::optional<FrameType>>& kinds);
-nlohmann::json regions_json(const std::vector<FrameComparison>& frames,
-                            const std::vector<std::optional<FrameType>>& kinds);
+// One for each frame: the RMS distance in its worst region, not a number in a frame that has none; its kind, if it is
+// known. title: of the table's rows.
+struct WorstRegions {
+    std::vector<double> worst_mm;
+    std::vector<std::optional<FrameType>> kinds;
+};
+std::string region_rows(const char* title, const WorstRegions& frames);
+nlohmann::json regions_json(const WorstRegions& frames);
 
 }  // namespace htvm::app

@@ -29,15 +29,12 @@ std::vector<NearestPlace> nearest_of(const std::vector<SurfaceSample>& samples, 
 }
 
 // Which of the places on the truth a camera sees.
-std::vector<bool> seen_at(const std::vector<NearestPlace>& places, const SearchedSurface& truth,
-                          const SearchedSurface& captured, std::span<const std::uint8_t> seen,
-                          const CoverageOptions& options) {
+std::vector<bool> seen_at(const std::vector<NearestPlace>& places, const SearchedSurface& captured,
+                          std::span<const std::uint8_t> seen, const CoverageOptions& options) {
     std::vector<bool> out;
     out.reserve(places.size());
     if (!seen.empty()) {
-        for (const auto& at : places)
-            out.push_back(
-                std::ranges::all_of(truth.mesh().triangles[at.triangle], [&](auto v) { return seen[v] != 0; }));
+        for (const auto& at : places) out.push_back(seen[at.triangle] != 0);
         return out;
     }
     std::vector<SurfaceSample> on_truth;
@@ -72,8 +69,8 @@ double rms(double squared, std::uint64_t samples) {
 Result<TruthCoverage> truth_coverage(const Mesh& captured, const Mesh& shown, const Mesh& truth,
                                      std::span<const std::uint8_t> seen, const CoverageOptions& options) {
     if (truth.triangles.empty()) return fail(ErrorKind::bad_input, "The true surface has no triangles.");
-    if (!seen.empty() && seen.size() != truth.positions.size())
-        return fail(ErrorKind::bad_input, "What is seen of the truth is not told for each of its vertices.");
+    if (!seen.empty() && seen.size() != truth.triangles.size())
+        return fail(ErrorKind::bad_input, "What is seen of the truth is not told for each of its triangles.");
     const auto of_captured = SearchedSurface::build(captured, options.threads);
     if (!of_captured) return tl::unexpected(of_captured.error());
     const auto of_shown = SearchedSurface::build(shown, options.threads);
@@ -87,7 +84,7 @@ Result<TruthCoverage> truth_coverage(const Mesh& captured, const Mesh& shown, co
         out.captured_squared += at.distance * at.distance;
     }
     const auto places = nearest_of(so_many_samples_on(shown, options.samples), *of_truth, options.threads);
-    const auto is_seen = seen_at(places, *of_truth, *of_captured, seen, options);
+    const auto is_seen = seen_at(places, *of_captured, seen, options);
     for (std::size_t i = 0; i < places.size(); ++i) {
         if (!is_seen[i]) continue;
         ++out.shown_samples;

@@ -51,9 +51,9 @@ TEST(TruthCoverage, TakesWhatIsSeenFromThoseWhoKnow) {
     for (auto& p : shown.positions)
         if (p[0] > 202) p[2] = 3;
     std::vector<std::uint8_t> seen;
-    for (const auto& p : truth.positions) seen.push_back(p[0] < 198);
+    for (const auto& t : truth.triangles) seen.push_back(truth.positions[t[0]][0] < 195);
     EXPECT_NEAR(shown_to_truth_rms(*truth_coverage(truth, shown, truth, seen)), 1, 1e-5);
-    const std::vector<std::uint8_t> all(truth.positions.size(), 1);
+    const std::vector<std::uint8_t> all(truth.triangles.size(), 1);
     EXPECT_GT(shown_to_truth_rms(*truth_coverage(truth, shown, truth, all)), 2);
     seen.pop_back();
     EXPECT_EQ(truth_coverage(truth, shown, truth, seen).error().kind, ErrorKind::bad_input);
