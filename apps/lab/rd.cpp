@@ -18,6 +18,7 @@
 #include "commands.h"
 #include "core/parallel.h"
 #include "io/sequence.h"
+#include "metrics/surface_border.h"
 #include "results.h"
 #include "sweep.h"
 
@@ -45,6 +46,7 @@ struct Options {
     int views = 10;
     std::size_t memory_megabytes = 1024;
     unsigned threads = 0, coder_threads = 1;
+    bool coverage_if_open = true;  // measure coverage, too, if the first captured mesh is open
     bool geometry_only = false, keep_frames = false, again = false, png = false, json = false;
     std::string output;
 };
@@ -87,6 +89,7 @@ CompareOptions compare_options(const Options& options) {
     out.regions = metrics.contains("regions");
     out.pictures = metrics.contains("m3");
     out.cloud = metrics.contains("d1");
+    out.coverage = metrics.contains("coverage");
     out.topology = false;
     out.surface_options.samples = options.samples;
     out.views.views = options.views;
@@ -105,6 +108,7 @@ Result<std::string> common_key(const Options& options) {
     std::string metrics;
     for (const auto& metric : std::set<std::string>(options.metrics.begin(), options.metrics.end()))
         metrics += metric + " ";
+    if (options.coverage_if_open) metrics += "coverage if open ";
     return fmt::format("{}; {}; geometry only {}; {}samples {}, views {}, every {}; coder threads {}",
                        fingerprint(inputs), key_of(options.capture), options.geometry_only, metrics, options.samples,
                        options.views, options.measure_every, options.coder_threads);
@@ -167,6 +171,11 @@ Result<void> run_tasks(const Options& options, const ResultCache& cache, Capture
     }
     SweepOptions sweep_options;
     sweep_options.compare = compare_options(options);
+    if (options.coverage_if_open) {
+        const auto first = source->frame(0);
+        if (!first) return tl::unexpected(first.error());
+        sweep_options.compare.coverage = is_open((*first)->mesh);
+    }
     sweep_options.measure_every = options.measure_every;
     sweep_options.threads = thread_count(options.threads);
     std::vector<std::string> failures;
@@ -200,6 +209,7 @@ void print_tables(const Options& options, const std::string& title, const std::v
     fmt::print("{}\n\n{}", title, rate_table(points));
     if (const auto table = enhanced_frame_table(points); !table.empty()) fmt::print("\n{}", table);
     if (const auto table = region_table(points); !table.empty()) fmt::print("\n{}", table);
+    if (const auto table = coverage_table(points); !table.empty()) fmt::print("\n{}", table);
     for (const char* reference : rate_references)
         if (const auto table = rate_difference_table(points, reference); !table.empty()) fmt::print("\n{}", table);
     std::string crossings;
@@ -215,6 +225,14 @@ void print_tables(const Options& options, const std::string& title, const std::v
             "regions: RMS error of a frame's worst region of 10 cm, 99th percentile over frames; patched: share of "
             "the\n"
             "surface that patches replace in a T- or TP-frame, on average.\n");
+    if (std::string(equal_m2_measure(points).key) == "covered_m2_mm")
+        fmt::print(
+            "coverage: share of the captured surface within 5 mm of what is shown, and of the shown surface within it "
+            "of\n"
+            "the captured; M2 and the worst region (99th percentile over frames) over what is covered. Bits at equal "
+            "M2 "
+            "are\n"
+            "those at equal M2 over what is covered (M2 cov.), which is fair at like coverage: see both.\n");
     if (std::ranges::find(options.metrics, "m3") != options.metrics.end())
         fmt::print("M3 fgr, SSIM: of the foreground of lit pictures; unlit, u.SSIM: of the same without shading.\n");
     if (options.coder_threads == 1)
@@ -226,10 +244,10 @@ nlohmann::json as_json(const Options& options, const std::string& title, const s
     for (const auto& point : points) list.push_back(to_json(point));
     nlohmann::json differences;
     for (const char* reference : rate_references) differences[reference] = rate_differences_json(points, reference);
-    return {{"program", "htvm-lab " HTVM_VERSION},       {"capture", title},
-            {"input", input_name(options.capture)},      {"surface_samples", options.samples},
-            {"coder_threads", options.coder_threads},    {"points", std::move(list)},
-            {"rate_differences", std::move(differences)}};
+    return {{"program", "htvm-lab " HTVM_VERSION},        {"capture", title},
+            {"input", input_name(options.capture)},       {"surface_samples", options.samples},
+            {"coder_threads", options.coder_threads},     {"points", std::move(list)},
+            {"rate_differences", std::move(differences)}, {"equal_m2", equal_m2_measure(points).key}};
 }
 
 Result<void> write_outputs(const Options& options, const std::vector<RdPoint>& points) {
@@ -310,11 +328,13 @@ void add_sweep_options(CLI::App& command, Options& o) {
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     command
-        .add_option("--metrics", o.metrics,
-                    "Any of m1, m2, m3 (pictures, also unlit, PSNR and SSIM: slow), d1 (with d2), regions (the worst\n"
-                    "region of 10 cm, of I-frames and of the others: 99th percentile over frames); default m1,m2")
+        .add_option(
+            "--metrics", o.metrics,
+            "Any of m1, m2, m3 (pictures, also unlit, PSNR and SSIM: slow), d1 (with d2), regions (the worst\n"
+            "region of 10 cm, of I-frames and of the others: 99th percentile over frames), coverage (and errors\n"
+            "over what is covered); default m1,m2, and coverage where the capture is open")
         ->delimiter(',')
-        ->check(CLI::IsMember({"m1", "m2", "m3", "d1", "regions"}))
+        ->check(CLI::IsMember({"m1", "m2", "m3", "d1", "regions", "coverage"}))
         ->option_text("LIST");
     command.add_option(
         "--samples", o.samples,
@@ -374,7 +394,10 @@ void add_rd(CLI::App& app, app::Run& run) {
         "  htvm synth out/synth --frames 60\n"
         "  htvm-lab rd out/synth -s out/synth/skeleton.json -q 35,50,65 --coders paper,htvm-ep,tfan,draco10,draco7 -o "
         "out/rd");
-    command->callback([options, &run] { run = [options] { return rate_distortion(*options); }; });
+    command->callback([options, command, &run] {
+        options->coverage_if_open = command->count("--metrics") == 0;
+        run = [options] { return rate_distortion(*options); };
+    });
 }
 
 }  // namespace htvm::lab

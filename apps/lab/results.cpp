@@ -15,12 +15,17 @@ using namespace app;
 
 namespace {
 
-constexpr std::array<Measure, 15> all_measures = {{
+constexpr std::array<Measure, 19> all_measures = {{
     {"m1_mm", "M1, vertex to vertex, RMS", "M1", "mm", "m1", true, true, 3},
     {"m1_colour", "M1 colour, RMS", "M1 col", "levels", "m1", true, true, 2},
     {"m2_mm", "M2, point to surface, RMS", "M2", "mm", "m2", true, true, 3},
     {"hausdorff_mm", "largest distance", "Hausd.", "mm", "m2", true, false, 1},
     {"m2_worst_frame_mm", "M2 of the worst frame", "worst", "mm", "m2", true, false, 3},
+    {"covered_m2_mm", "M2 over what is covered, RMS", "M2 cov.", "mm", "coverage", true, true, 3},
+    {"captured_covered", "share of the captured surface that is covered", "capt.", "of 1", "coverage", false, false, 4},
+    {"shown_covered", "share of the shown surface that is covered", "shown", "of 1", "coverage", false, false, 4},
+    {"covered_region_p99_mm", "worst region over what is covered, 99th percentile", "reg. c.", "mm", "coverage", true,
+     false, 3},
     {"region_p99_mm", "worst region of frames between I-frames, 99th percentile", "region", "mm", "regions", true,
      false, 3},
     {"region_intra_p99_mm", "worst region of I-frames, 99th percentile", "reg. I", "mm", "regions", true, false, 3},
@@ -61,6 +66,7 @@ nlohmann::json frame_to_json(const RdFrame& frame) {
             {"m1_mm", optional_json(frame.m1_mm)},
             {"m2_mm", optional_json(frame.m2_mm)},
             {"worst_region_mm", optional_json(frame.worst_region_mm)},
+            {"covered_worst_region_mm", optional_json(frame.covered_region_mm)},
             {"recoded_share", frame.recoded}};
 }
 
@@ -75,6 +81,7 @@ RdFrame frame_from_json(const nlohmann::json& json) {
     frame.m1_mm = optional_number(json, "m1_mm");
     frame.m2_mm = optional_number(json, "m2_mm");
     frame.worst_region_mm = optional_number(json, "worst_region_mm");
+    frame.covered_region_mm = optional_number(json, "covered_worst_region_mm");
     frame.recoded = json.at("recoded_share").get<double>();
     return frame;
 }
@@ -142,6 +149,9 @@ void take_measures(const ComparisonSummary& s, const CompareOptions& options, st
     take("m2_mm", options.surface, s.m2_mm);
     take("hausdorff_mm", options.surface, s.hausdorff_mm);
     take("m2_worst_frame_mm", options.surface, s.m2_worst_frame_mm);
+    take("covered_m2_mm", options.coverage && s.has_covered, s.covered_m2_mm);
+    take("captured_covered", options.coverage, s.captured_covered);
+    take("shown_covered", options.coverage, s.shown_covered);
     take("m3_foreground_db", options.pictures, s.m3_foreground_db);
     take("m3_full_db", options.pictures, s.m3_full_db);
     take("m3_ssim", options.pictures, s.m3_ssim);
@@ -152,19 +162,21 @@ void take_measures(const ComparisonSummary& s, const CompareOptions& options, st
 }
 
 void take_frame_measures(RdPoint& point) {
-    std::vector<double> intra, between;
+    std::vector<double> intra, between, covered;
     double patched = 0;
     std::size_t tracked = 0;
     for (const auto& frame : point.frames) {
         const bool is_intra = frame.type == FrameType::intra;
         if (frame.worst_region_mm && std::isfinite(*frame.worst_region_mm))
             (is_intra ? intra : between).push_back(*frame.worst_region_mm);
+        if (frame.covered_region_mm) covered.push_back(*frame.covered_region_mm);
         if (frame.type != FrameType::tracked && frame.type != FrameType::patched) continue;
         ++tracked;
         patched += frame.recoded;
     }
     if (!intra.empty()) point.values["region_intra_p99_mm"] = summarise(std::move(intra)).p99_mm;
     if (!between.empty()) point.values["region_p99_mm"] = summarise(std::move(between)).p99_mm;
+    if (!covered.empty()) point.values["covered_region_p99_mm"] = summarise(std::move(covered)).p99_mm;
     if (tracked > 0) point.values["patched_share"] = patched / static_cast<double>(tracked);
 }
 
@@ -271,6 +283,11 @@ double intra_share(const RdPoint& point) {
     return all == 0 ? 0 : static_cast<double>(totals(point, FrameType::intra).bytes.total()) / static_cast<double>(all);
 }
 
+std::string value_or_dash(const RdPoint& point, const char* key, double scale, int digits) {
+    const auto found = point.values.find(key);
+    return found == point.values.end() ? "-" : fmt::format("{:.{}f}", scale * found->second, digits);
+}
+
 const RdPoint* extreme(std::span<const RdPoint> points, const std::string& coder, bool cheapest) {
     const RdPoint* out = nullptr;
     for (const auto& point : points) {
@@ -329,8 +346,7 @@ std::string region_table(std::span<const RdPoint> points) {
     std::string rows;
     for (const auto& point : points) {
         const auto value = [&](const char* key, double scale, int digits) {
-            const auto found = point.values.find(key);
-            return found == point.values.end() ? "-" : fmt::format("{:.{}f}", scale * found->second, digits);
+            return value_or_dash(point, key, scale, digits);
         };
         if (!point.values.contains("region_p99_mm") && !point.values.contains("region_intra_p99_mm") &&
             totals(point, FrameType::patched).frames == 0)
@@ -344,6 +360,30 @@ std::string region_table(std::span<const RdPoint> points) {
     return fmt::format("{:<10}{:>5}{:>9}{:>9}{:>9}{:>12}{:>12}{:>14}\n", "regions", "q", "I", "T", "TP", "of I, mm",
                        "others, mm", "patched, %") +
            rows;
+}
+
+std::string coverage_table(std::span<const RdPoint> points) {
+    std::string rows;
+    for (const auto& point : points) {
+        if (!point.values.contains("captured_covered")) continue;
+        rows += fmt::format("{:<10}{:>5g}{:>9.3f}{:>13}{:>10}{:>14}{:>14}\n", point.coder, point.quality,
+                            bits_per_vertex(point), value_or_dash(point, "captured_covered", 100, 2),
+                            value_or_dash(point, "shown_covered", 100, 2), value_or_dash(point, "covered_m2_mm", 1, 3),
+                            value_or_dash(point, "covered_region_p99_mm", 1, 3));
+    }
+    if (rows.empty()) return {};
+    return fmt::format("{:<10}{:>5}{:>9}{:>13}{:>10}{:>14}{:>14}\n", "coverage", "q", "bpvf", "captured, %", "shown, %",
+                       "M2 there, mm", "region p99") +
+           rows;
+}
+
+const Measure& equal_m2_measure(std::span<const RdPoint> points) {
+    const auto all = measures();
+    const auto called = [&](const std::string& key) -> const Measure& {
+        return *std::ranges::find_if(all, [&](const Measure& measure) { return key == measure.key; });
+    };
+    const Measure& covered = called("covered_m2_mm");
+    return measured(points, covered) ? covered : called("m2_mm");
 }
 
 std::string rate_difference_table(std::span<const RdPoint> points, const std::string& reference) {

@@ -36,6 +36,7 @@ struct RdFrame {
     std::optional<double> decode_ms;
     double recoded = 1;                                   // CodedFrame::recoded
     std::optional<double> m1_mm, m2_mm, worst_region_mm;  // set if the frame was measured
+    std::optional<double> covered_region_mm;              // its worst region over what is covered; if there is one
 };
 
 struct RdPoint {
@@ -63,7 +64,8 @@ std::vector<RatePoint> rate_curve(std::span<const RdPoint> points, const std::st
 void take_measures(const ComparisonSummary& summary, const CompareOptions& options,
                    std::map<std::string, double>& values);
 
-// Writes what follows from the frames one by one: the percentiles of their worst regions, and how much patches replace.
+// Writes what follows from the frames one by one: the percentiles of their worst regions, also over what is covered,
+// and how much patches replace.
 void take_frame_measures(RdPoint& point);
 
 nlohmann::json to_json(const RdPoint& point);
@@ -84,6 +86,13 @@ std::string enhanced_frame_table(std::span<const RdPoint> points);
 // The worst regions of I-frames and of the frames between, and how much of the surface patches replace; empty if there
 // are neither worst regions nor patches.
 std::string region_table(std::span<const RdPoint> points);
+
+// How much of the captured and of the shown surface is covered, and the errors over it (metrics/coverage.h); empty if
+// that was not measured.
+std::string coverage_table(std::span<const RdPoint> points);
+
+// The measure at which bits are compared at equal M2: over what is covered where that was measured, else M2.
+const Measure& equal_m2_measure(std::span<const RdPoint> points);
 
 // Bjontegaard rate differences of every coder relative to `reference`, for every measure that was taken; empty if the
 // reference was not measured.

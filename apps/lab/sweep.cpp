@@ -214,6 +214,8 @@ Result<RdFrame> run_frame(const SweepJob& job, const FrameCoder& coder, const So
         if (options.compare.points) out.m1_mm = m1_geometry(compared->points);
         if (options.compare.surface) out.m2_mm = m2(compared->surface);
         if (options.compare.regions) out.worst_region_mm = compared->region.worst_mm;
+        if (options.compare.coverage && compared->coverage.region.regions > 0)
+            out.covered_region_mm = compared->coverage.region.worst_mm;
         sums += *compared;
     }
     if (auto kept = keep_frame(job.keep_frames, source, coded->decoded); !kept) return tl::unexpected(kept.error());

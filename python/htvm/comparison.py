@@ -75,7 +75,7 @@ def compare(
     """Measures decoded meshes against their originals, by running ``htvm compare``.
 
     original, decoded: a mesh file, a folder or a pattern of them, for decoded also a stream; or meshes in memory
-    metrics: of "m1" (vertices), "m2" (surfaces), "texcoords", "d1", "d2" (point clouds), "m3" (pictures), "flicker", "topology"
+    metrics: of "m1" (vertices), "m2" (surfaces), "regions", "coverage" (of open captures), "texcoords", "d1", "d2" (point clouds), "m3" (pictures), "flicker", "topology"
     frames: at most so many
     unit: of files that are not streams; meshes in memory are in millimetres
     program: the program, if it is neither on the PATH nor in HTVM_PROGRAM

@@ -43,9 +43,11 @@ CloudErrorSums sum_cloud_errors(const Mesh& from, const Mesh& to, std::span<cons
 }
 
 CloudError cloud_error(const Mesh& original, const Mesh& decoded, internal::Threads threads) {
-    const auto forward = nearest_vertices(original.positions, decoded.positions, threads);
-    const auto backward = nearest_vertices(decoded.positions, original.positions, threads);
-    return {sum_cloud_errors(original, decoded, forward), sum_cloud_errors(decoded, original, backward)};
+    const auto first = without_hidden_vertices(original), second = without_hidden_vertices(decoded);
+    const Mesh &from = first ? *first : original, &to = second ? *second : decoded;
+    const auto forward = nearest_vertices(from.positions, to.positions, threads);
+    const auto backward = nearest_vertices(to.positions, from.positions, threads);
+    return {sum_cloud_errors(from, to, forward), sum_cloud_errors(to, from, backward)};
 }
 
 double psnr(double peak, double mean_squared_error) {

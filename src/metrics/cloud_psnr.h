@@ -35,9 +35,10 @@ CloudError& operator+=(CloudError& sums, const CloudError& frame);
 // One direction, where nearest = nearest_vertices(from.positions, to.positions). The normals are to.normals or, if the
 // mesh has none, those of its triangles, weighted by area. A vertex without a normal (no triangle with an area, a zero
 // vector) counts with its whole distance. Infinite if there is nothing to compare with.
+// All vertices count: leave those out before that are not shown (without_hidden_vertices in mesh_measures.h).
 CloudErrorSums sum_cloud_errors(const Mesh& from, const Mesh& to, std::span<const std::uint32_t> nearest);
 
-// One frame, both directions.
+// One frame, both directions, of the vertices that are shown.
 CloudError cloud_error(const Mesh& original, const Mesh& decoded, internal::Threads threads = {});
 
 // 10 log10(peak^2 / error) in dB. Infinity if the error is 0; minus infinity if it is infinite or the peak is 0.

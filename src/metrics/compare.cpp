@@ -5,7 +5,10 @@
 namespace htvm {
 namespace {
 
-void compare_vertices(const Mesh& original, const Mesh& decoded, const CompareOptions& options, FrameComparison& out) {
+void compare_vertices(const Mesh& original_mesh, const Mesh& decoded_mesh, const CompareOptions& options,
+                      FrameComparison& out) {
+    const auto first = without_hidden_vertices(original_mesh), second = without_hidden_vertices(decoded_mesh);
+    const Mesh &original = first ? *first : original_mesh, &decoded = second ? *second : decoded_mesh;
     const auto forward = nearest_vertices(original.positions, decoded.positions, options.threads);
     const auto backward = nearest_vertices(decoded.positions, original.positions, options.threads);
     if (options.points)
@@ -27,6 +30,10 @@ Result<void> compare_pictures(const ShownMesh& original, const ShownMesh& decode
     out.unlit_pictures =
         compare_views(make_drawable(original, render), make_drawable(decoded, render), *cameras, options.threads);
     return {};
+}
+
+std::uint64_t shown_count(const Mesh& mesh) {
+    return static_cast<std::uint64_t>(std::ranges::count(shown_vertices(mesh), true));
 }
 
 Topology& operator+=(Topology& sums, const Topology& t) {
@@ -58,8 +65,8 @@ Result<FrameComparison> compare_frame(const ComparedMesh& first, const ComparedM
     if (const auto ok = check_measurable(original, "original"); !ok) return tl::unexpected(ok.error());
     if (const auto ok = check_measurable(decoded, "decoded mesh"); !ok) return tl::unexpected(ok.error());
     FrameComparison out;
-    out.original_vertices = original.positions.size();
-    out.decoded_vertices = decoded.positions.size();
+    out.original_vertices = shown_count(original);
+    out.decoded_vertices = shown_count(decoded);
     out.original_triangles = original.triangles.size();
     out.decoded_triangles = decoded.triangles.size();
     out.original_box = bounding_box(original);
@@ -77,6 +84,13 @@ Result<FrameComparison> compare_frame(const ComparedMesh& first, const ComparedM
         const auto error = worst_region(original, decoded, regions);
         if (!error) return tl::unexpected(error.error());
         out.region = *error;
+    }
+    if (options.coverage) {
+        CoverageOptions covered = options.coverage_options;
+        covered.threads = options.threads;
+        const auto found = coverage(original, decoded, covered);
+        if (!found) return tl::unexpected(found.error());
+        out.coverage = *found;
     }
     if (options.texcoords) {
         const auto error = texcoord_error(original, decoded, options.threads);
@@ -106,6 +120,7 @@ SequenceComparison& operator+=(SequenceComparison& sums, const FrameComparison& 
     extend(sums.original_box, frame.original_box);
     sums.points += frame.points;
     sums.surface += frame.surface;
+    sums.coverage += frame.coverage;
     sums.texcoords += frame.texcoords;
     sums.cloud += frame.cloud;
     sums.pictures += frame.pictures;
@@ -136,6 +151,17 @@ ComparisonSummary summarise(const SequenceComparison& sums, double peak_mm) {
     out.m2_backward = sequence_backward(sums.surface);
     out.m2_mm = m2(sums.surface);
     out.m2_worst_frame_mm = sums.surface.worst_frame_rms;
+    out.captured_covered = covered_share(sums.coverage.captured);
+    out.captured_absent = absent_share(sums.coverage.captured);
+    out.captured_least_covered = sums.coverage.captured.least_covered;
+    out.shown_covered = covered_share(sums.coverage.shown);
+    out.shown_absent = absent_share(sums.coverage.shown);
+    out.shown_least_covered = sums.coverage.shown.least_covered;
+    out.has_covered = sums.coverage.errors.frames > 0;
+    out.covered_forward = sequence_forward(sums.coverage.errors);
+    out.covered_backward = sequence_backward(sums.coverage.errors);
+    out.covered_m2_mm = m2(sums.coverage.errors);
+    out.covered_worst_frame_mm = sums.coverage.errors.worst_frame_rms;
     out.has_texcoords = sums.texcoords.area > 0;
     out.texcoord_rms = rms_texcoord(sums.texcoords);
     out.texcoord_elsewhere = share_elsewhere(sums.texcoords);

@@ -10,6 +10,7 @@
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "metrics/cloud_psnr.h"
+#include "metrics/coverage.h"
 #include "metrics/mesh_measures.h"
 #include "metrics/picture_error.h"
 #include "metrics/point_error.h"
@@ -24,27 +25,31 @@ struct CompareOptions {
     bool points = true;     // M1, geometry and colour
     bool surface = true;    // M2
     bool regions = true;    // the worst region
+    bool coverage = false;  // of open captures: coverage, and the errors over what is covered
     bool texcoords = true;  // if both meshes have them
     bool cloud = true;      // D1 and D2
     bool pictures = true;   // M3 and SSIM; and unlit, where both meshes have colours
     bool topology = true;   // counts
     SurfaceErrorOptions surface_options;
     TopologyMeasureOptions topology_options;
+    CoverageOptions coverage_options;
     ViewOptions views;
     RenderOptions render;            // colours and textures are drawn only if both meshes have some
     std::optional<Box> view_box;     // what the cameras look at in every frame; empty: the bounding box of each
                                      // original
-    internal::Threads threads = {};  // the number of threads does not change the results (overrides surface_options')
+    internal::Threads threads = {};  // the number of threads does not change the results (overrides those of
+                                     // surface_options and coverage_options)
 };
 
 // One frame. Metrics that were not asked for are left zero.
 struct FrameComparison {
-    std::uint64_t original_vertices = 0, decoded_vertices = 0;
+    std::uint64_t original_vertices = 0, decoded_vertices = 0;  // those that are shown
     std::uint64_t original_triangles = 0, decoded_triangles = 0;
     Box original_box;
     PointError points;
     SurfaceError surface;
     RegionError region;
+    FrameCoverage coverage;
     TexcoordError texcoords;
     CloudError cloud;
     PictureErrorSums pictures;        // as CompareOptions::render says
@@ -75,6 +80,7 @@ struct SequenceComparison {
     Box original_box;  // around all frames
     PointError points;
     SurfaceErrorSums surface;
+    CoverageSums coverage;
     TexcoordError texcoords;
     CloudError cloud;
     PictureErrorSums pictures, unlit_pictures;
@@ -91,6 +97,13 @@ struct ComparisonSummary {
     double m1_colour = 0, m1_colour_forward = 0, m1_colour_backward = 0;  // levels
     double m2_mm = 0, m2_worst_frame_mm = 0;
     SurfaceDistances m2_forward, m2_backward;
+    // Coverage, 0..1, of the captured and of the shown surface; the least of a frame; and the errors over what is
+    // covered, if anything was in some frame.
+    double captured_covered = 1, captured_absent = 0, captured_least_covered = 1;
+    double shown_covered = 1, shown_absent = 0, shown_least_covered = 1;
+    bool has_covered = false;
+    double covered_m2_mm = 0, covered_worst_frame_mm = 0;
+    SurfaceDistances covered_forward, covered_backward;
     bool has_texcoords = false;                       // likewise
     double texcoord_rms = 0, texcoord_elsewhere = 0;  // see texcoord_error.h; 0..1
     double hausdorff_mm = 0;                          // the largest distance in both directions and all frames

@@ -29,6 +29,33 @@ Result<void> check_measurable(const Mesh& mesh, const std::string& name) {
     return {};
 }
 
+std::vector<bool> shown_vertices(const Mesh& mesh) {
+    std::vector<bool> shown(mesh.positions.size(), mesh.triangles.empty());
+    for (const auto& t : mesh.triangles)
+        for (const std::uint32_t v : t) shown[v] = true;
+    return shown;
+}
+
+std::optional<Mesh> without_hidden_vertices(const Mesh& mesh) {
+    const auto shown = shown_vertices(mesh);
+    if (std::ranges::all_of(shown, [](bool is) { return is; })) return std::nullopt;
+    Mesh out;
+    std::vector<std::uint32_t> number(shown.size());
+    const auto keep = [](const auto& from, std::size_t v, auto& to) {
+        if (!from.empty()) to.push_back(from[v]);
+    };
+    for (std::size_t v = 0; v < shown.size(); ++v) {
+        if (!shown[v]) continue;
+        number[v] = static_cast<std::uint32_t>(out.positions.size());
+        keep(mesh.positions, v, out.positions);
+        keep(mesh.colours, v, out.colours);
+        keep(mesh.normals, v, out.normals);
+        keep(mesh.texcoords, v, out.texcoords);
+    }
+    for (const auto& t : mesh.triangles) out.triangles.push_back({number[t[0]], number[t[1]], number[t[2]]});
+    return out;
+}
+
 void extend(Box& box, const Box& other) {
     if (other.empty) return;
     if (box.empty) {
@@ -43,11 +70,22 @@ void extend(Box& box, const Box& other) {
 
 Box bounding_box(const Mesh& mesh) {
     Box box;
-    for (const auto& p : mesh.positions) extend(box, Box{to_point(p), to_point(p), false});
+    const auto shown = shown_vertices(mesh);
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+        if (shown[v]) extend(box, Box{to_point(mesh.positions[v]), to_point(mesh.positions[v]), false});
     return box;
 }
 
 double diagonal(const Box& box) { return length(box.high - box.low); }
+
+double surface_area(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
+    double area = 0;
+    for (const auto& t : triangles) {
+        const Point3 a = to_point(positions[t[0]]);
+        area += length(cross(to_point(positions[t[1]]) - a, to_point(positions[t[2]]) - a)) / 2;
+    }
+    return area;
+}
 
 std::vector<std::uint32_t> first_coincident_vertex(const Mesh& mesh) {
     std::vector<std::uint32_t> order(mesh.positions.size());

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,14 +29,22 @@ inline constexpr float largest_coordinate = 1e9f;  // mm
 // identifies the mesh in the message. Every other function of src/metrics expects a mesh that passed this check.
 Result<void> check_measurable(const Mesh& mesh, const std::string& name);
 
+// Vertices that no triangle names are not shown, and no metric counts them. In a mesh without triangles, a point cloud,
+// all are shown.
+std::vector<bool> shown_vertices(const Mesh& mesh);
+// The mesh without the others; nothing if it has none.
+std::optional<Mesh> without_hidden_vertices(const Mesh& mesh);
+
 // Axis-aligned box in mm; empty until something is put in.
 struct Box {
     Point3 low{}, high{};
     bool empty = true;
 };
 void extend(Box& box, const Box& other);
-Box bounding_box(const Mesh& mesh);
-double diagonal(const Box& box);  // mm; 0 for an empty box
+Box bounding_box(const Mesh& mesh);  // of what is shown
+double diagonal(const Box& box);     // mm; 0 for an empty box
+
+double surface_area(std::span<const Vector3f> positions, std::span<const Triangle> triangles);  // mm^2
 
 // For each vertex, the lowest index of a vertex at exactly the same position (its own if it is the first).
 std::vector<std::uint32_t> first_coincident_vertex(const Mesh& mesh);

@@ -107,9 +107,11 @@ PointErrorSums sum_point_errors(const Mesh& from, const Mesh& to, std::span<cons
 }
 
 PointError point_error(const Mesh& original, const Mesh& decoded, Threads threads) {
-    const auto forward = nearest_vertices(original.positions, decoded.positions, threads);
-    const auto backward = nearest_vertices(decoded.positions, original.positions, threads);
-    return {sum_point_errors(original, decoded, forward), sum_point_errors(decoded, original, backward)};
+    const auto first = without_hidden_vertices(original), second = without_hidden_vertices(decoded);
+    const Mesh &from = first ? *first : original, &to = second ? *second : decoded;
+    const auto forward = nearest_vertices(from.positions, to.positions, threads);
+    const auto backward = nearest_vertices(to.positions, from.positions, threads);
+    return {sum_point_errors(from, to, forward), sum_point_errors(to, from, backward)};
 }
 
 double rms_distance(const PointErrorSums& sums) {

@@ -35,11 +35,12 @@ struct PointError {
 };
 PointError& operator+=(PointError& sums, const PointError& frame);
 
-// The sums of one direction, where nearest = nearest_vertices(from.positions, to.positions).
+// The sums of one direction, where nearest = nearest_vertices(from.positions, to.positions). All vertices count: leave
+// those out before that are not shown (without_hidden_vertices in mesh_measures.h).
 PointErrorSums sum_point_errors(const Mesh& from, const Mesh& to, std::span<const std::uint32_t> nearest);
 
-// The sums of one frame in both directions. A mesh without vertices adds nothing in the direction from it, and an
-// infinite distance in the direction to it.
+// The sums of one frame in both directions, of the vertices that are shown. A mesh without vertices adds nothing in the
+// direction from it, and an infinite distance in the direction to it.
 PointError point_error(const Mesh& original, const Mesh& decoded, internal::Threads threads = {});
 
 // Root mean squared difference of eq. 9; 0 if nothing was compared.

@@ -6,15 +6,6 @@
 
 namespace htvm {
 
-double surface_area(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
-    double area = 0;
-    for (const auto& t : triangles) {
-        const Point3 a = to_point(positions[t[0]]);
-        area += length(cross(to_point(positions[t[1]]) - a, to_point(positions[t[2]]) - a)) / 2;
-    }
-    return area;
-}
-
 std::size_t kept_triangles(const MeshView& decoded, const FrameInfo& sent) {
     const std::size_t all = decoded.triangles.size();
     switch (sent.type) {

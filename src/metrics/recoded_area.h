@@ -8,9 +8,6 @@
 
 namespace htvm {
 
-// mm^2.
-double surface_area(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
-
 // How many triangles of a decoded frame its reference has too; in a TP-frame they are the first ones. sent: inspect()
 // of its packet, which counts what a patch brings.
 std::size_t kept_triangles(const MeshView& decoded, const FrameInfo& sent);

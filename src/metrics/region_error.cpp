@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "metrics/percentile.h"
+#include "metrics/surface_samples.h"
 #include "metrics/triangle_index.h"
 
 namespace htvm {
@@ -15,40 +16,16 @@ namespace htvm {
 using namespace internal;
 namespace {
 
-// A reproducible number in [0, 1) for each sample and coordinate: an additive recurrence with the plastic number
-// (Roberts 2018), which fills every triangle evenly.
-double evenly(std::size_t sample, double step) {
-    const double x = 0.5 + step * static_cast<double>(sample);
-    return x - std::floor(x);
-}
-
-// Points on the triangles, one for each squared spacing of area.
-std::vector<Point3> samples_on(const Mesh& mesh, double spacing) {
-    std::vector<Point3> out;
-    double area = 0;
-    for (const auto& t : mesh.triangles) {
-        const Point3 a = to_point(mesh.positions[t[0]]);
-        const Point3 ab = to_point(mesh.positions[t[1]]) - a, ac = to_point(mesh.positions[t[2]]) - a;
-        area += length(cross(ab, ac)) / 2;
-        while ((static_cast<double>(out.size()) + 0.5) * spacing * spacing < area) {
-            double u = evenly(out.size(), 0.7548776662466927), v = evenly(out.size(), 0.5698402909980532);
-            if (u + v > 1) u = 1 - u, v = 1 - v;
-            out.push_back(a + ab * u + ac * v);
-        }
-    }
-    return out;
-}
-
-// The point of the surface that is nearest to each point.
-std::vector<Point3> nearest_on(const Mesh& mesh, const TriangleIndex& index, const std::vector<Point3>& points,
+// The point of the surface that is nearest to each sample.
+std::vector<Point3> nearest_on(const Mesh& mesh, const TriangleIndex& index, const std::vector<SurfaceSample>& samples,
                                Threads threads) {
-    std::vector<Point3> out(points.size());
-    parallel_for(points.size(), threads, 512, [&](std::size_t begin, std::size_t end) {
+    std::vector<Point3> out(samples.size());
+    parallel_for(samples.size(), threads, 512, [&](std::size_t begin, std::size_t end) {
         std::uint32_t hint = 0;
         for (std::size_t i = begin; i < end; ++i) {
-            hint = index.closest(points[i], hint).triangle;
+            hint = index.closest(samples[i].place, hint).triangle;
             const Triangle& t = mesh.triangles[hint];
-            out[i] = closest_point_of(points[i], to_point(mesh.positions[t[0]]), to_point(mesh.positions[t[1]]),
+            out[i] = closest_point_of(samples[i].place, to_point(mesh.positions[t[0]]), to_point(mesh.positions[t[1]]),
                                       to_point(mesh.positions[t[2]]));
         }
     });
@@ -104,13 +81,12 @@ struct Sums {
     double rms() const { return samples > 0 ? std::sqrt(squared / static_cast<double>(samples)) : 0; }
 };
 
-// For each region, of the pairs of points whose `place` lies within it.
-std::vector<Sums> sums_by_region(const Centres& centres, const std::vector<Point3>& places,
-                                 const std::vector<Point3>& others) {
+// For each region, of the pairs whose place on the original lies within it.
+std::vector<Sums> sums_by_region(const Centres& centres, std::span<const PlacePair> pairs) {
     std::vector<Sums> sums(centres.places().size());
-    for (std::size_t i = 0; i < places.size(); ++i) {
-        const Point3 away = places[i] - others[i];
-        centres.visit_around(places[i], [&](std::size_t region) {
+    for (const PlacePair& pair : pairs) {
+        const Point3 away = pair.original - pair.decoded;
+        centres.visit_around(pair.original, [&](std::size_t region) {
             ++sums[region].samples;
             sums[region].squared += dot(away, away);
         });
@@ -132,16 +108,25 @@ Result<RegionError> worst_region(const Mesh& original, const Mesh& decoded, cons
     const auto shown = TriangleIndex::build(decoded, options.threads);
     if (!shown) return tl::unexpected(shown.error());
     const auto of_original = samples_on(original, options.spacing), of_decoded = samples_on(decoded, options.spacing);
+    const auto beside_original = nearest_on(decoded, *shown, of_original, options.threads),
+               beside_decoded = nearest_on(original, *captured, of_decoded, options.threads);
+    std::vector<PlacePair> forward, backward;
+    for (std::size_t i = 0; i < of_original.size(); ++i) forward.push_back({of_original[i].place, beside_original[i]});
+    for (std::size_t i = 0; i < of_decoded.size(); ++i) backward.push_back({beside_decoded[i], of_decoded[i].place});
+    return worst_region_among(forward, backward, options);
+}
+
+RegionError worst_region_among(std::span<const PlacePair> forward, std::span<const PlacePair> backward,
+                               const RegionErrorOptions& options) {
+    RegionError out;
     Centres centres(options.radius);
-    for (const Point3& point : of_original) centres.add_unless_covered(point);
-    const auto forward =
-        sums_by_region(centres, of_original, nearest_on(decoded, *shown, of_original, options.threads));
-    const auto backward =
-        sums_by_region(centres, nearest_on(original, *captured, of_decoded, options.threads), of_decoded);
-    for (std::size_t region = 0; region < forward.size(); ++region) {
-        if (forward[region].samples < options.fewest_samples) continue;
+    for (const PlacePair& pair : forward) centres.add_unless_covered(pair.original);
+    const auto of_original = sums_by_region(centres, forward), of_decoded = sums_by_region(centres, backward);
+    for (std::size_t region = 0; region < of_original.size(); ++region) {
+        if (of_original[region].samples < options.fewest_samples) continue;
         ++out.regions;
-        const double error = std::max(forward[region].rms(), backward[region].rms());
+        const bool both = of_decoded[region].samples >= options.fewest_decoded;
+        const double error = std::max(of_original[region].rms(), both ? of_decoded[region].rms() : 0);
         if (error <= out.worst_mm) continue;
         out.worst_mm = error;
         out.centre = centres.places()[region];

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "core/thread.h"
@@ -16,6 +17,7 @@ struct RegionErrorOptions {
     double radius = 50;               // mm: a region is what lies within a ball around a point of the original
     double spacing = 6;               // mm between samples, about
     std::size_t fewest_samples = 20;  // a region with fewer of them on the original is a speck, and not measured
+    std::size_t fewest_decoded = 0;   // with fewer of them on the decoded surface it is not measured from there
     internal::Threads threads = {};   // the number of threads does not change the result
 };
 
@@ -30,6 +32,15 @@ struct RegionError {
 // whose nearest point on the original lies within it. An original without triangles has no regions; a decoded
 // mesh without any is infinitely far away. Both meshes must be measurable. Errors: limit, if memory runs out.
 Result<RegionError> worst_region(const Mesh& original, const Mesh& decoded, const RegionErrorOptions& options = {});
+
+// As above, but of pairs of places that were found elsewhere, of which only some may count: a sample on one surface and
+// what the other has for it. forward: samples of the original; backward: of the decoded surface. The spacing of the
+// options is not used; theirs may be another.
+struct PlacePair {
+    Point3 original{}, decoded{};
+};
+RegionError worst_region_among(std::span<const PlacePair> forward, std::span<const PlacePair> backward,
+                               const RegionErrorOptions& options = {});
 
 // The worst regions of several frames.
 struct RegionErrorSummary {

@@ -10,6 +10,7 @@
 
 #include "core/parallel.h"
 #include "core/srgb.h"
+#include "metrics/mesh_measures.h"
 
 namespace htvm {
 
@@ -40,8 +41,10 @@ std::array<std::uint8_t, 4> reduced(const Picture& large, std::size_t x, std::si
 
 Camera zoomed_to(const Mesh& mesh, const Camera& camera, double margin) {
     double across = 0, upright = 0;  // shares of half of the picture that the mesh takes with `camera`
-    for (const auto& position : mesh.positions) {
-        const Point3 d = to_point(position) - camera.position;
+    const auto shown = shown_vertices(mesh);
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+        if (!shown[v]) continue;
+        const Point3 d = to_point(mesh.positions[v]) - camera.position;
         const double depth = -dot(d, camera.backward);
         const double scale = camera.orthographic ? camera.scale : depth > 0 ? camera.scale / depth : 0;
         across = std::max(across, std::abs(dot(d, camera.right)) * scale / (camera.width / 2.0));

@@ -18,7 +18,7 @@ struct SmoothPicture {
 };
 
 // The camera, zoomed in or out until the mesh fills the picture up to the margin, a share of it on each side. As it is
-// if it sees no vertex beside its axis.
+// if it sees no vertex beside its axis; vertices that are not shown (mesh_measures.h) do not count.
 Camera zoomed_to(const Mesh& mesh, const Camera& camera, double margin);
 
 // samples: across a pixel, 1..16; a pixel is the mean of samples * samples, as light. The canvas is that much larger

@@ -81,9 +81,7 @@ std::vector<Edge> unique_edges(const Mesh& mesh) {
 Point3 at(const Mesh& mesh, std::uint32_t vertex) { return to_point(mesh.positions[vertex]); }
 
 std::vector<std::uint32_t> used_vertices(const Mesh& mesh) {
-    std::vector<bool> used(mesh.positions.size(), mesh.triangles.empty());
-    for (const auto& t : mesh.triangles)
-        for (std::uint32_t v : t) used[v] = true;
+    const auto used = shown_vertices(mesh);
     std::vector<std::uint32_t> vertices;
     for (std::uint32_t v = 0; v < used.size(); ++v)
         if (used[v]) vertices.push_back(v);
@@ -171,11 +169,11 @@ DistanceSums measure_plan(const Mesh& from, const SamplingPlan& plan, const Tria
     return total;
 }
 
-// For `to` without triangles: the samples are the vertices of `from`, the surface the vertices of `to`.
+// For `to` without triangles: the samples are the vertices of `from` that are shown, the surface the vertices of `to`.
 SurfaceDistances distances_to_vertices(const Mesh& from, const Mesh& to, Threads threads) {
     DistanceSums sums;
     const auto nearest = nearest_vertices(from.positions, to.positions, threads);
-    for (std::uint32_t v = 0; v < from.positions.size(); ++v) {
+    for (const std::uint32_t v : used_vertices(from)) {
         const double infinity = std::numeric_limits<double>::infinity();
         const Point3 d = nearest.empty() ? Point3{} : at(from, v) - at(to, nearest[v]);
         add(sums, nearest.empty() ? infinity : dot(d, d));

@@ -54,6 +54,18 @@ expect 1 "there is no frame" "$lab" decoding "$lab"
 # The worst regions and what patches replace, on request.
 expect 0 "of I, mm" "$lab" rd capture -o regions -q 40 --coders htvm-t --metrics m2,regions
 
+# Of an open capture also coverage, and bits at equal M2 over it.
+mkdir sheet
+awk 'BEGIN {
+    for (y = 0; y <= 20; ++y) for (x = 0; x <= 20; ++x) print "v", 20 * x, 20 * y, 30 * sin(x / 3) + 20 * cos(y / 2)
+    for (y = 0; y < 20; ++y) for (x = 0; x < 20; ++x) { v = 21 * y + x + 1; print "f", v, v + 1, v + 22; print "f", v, v + 22, v + 21 }
+}' >sheet/0.obj
+expect 0 "those at equal M2 over what is covered (M2 cov.)" "$lab" rd sheet --unit mm -o open -q 20,40 --coders tfan,draco10
+expect 0 "captured, %" "$lab" rd sheet --unit mm -o open -q 20,40 --coders tfan,draco10
+grep -q '"equal_m2": "covered_m2_mm"' open/rd.json && grep -q '"equal_m2": "m2_mm"' rd/rd.json && grep -q 'captured_covered' open/rd.csv ||
+    { echo "FAILED: rd.json does not say what errors are equal"; failures=$((failures + 1)); }
+grep -q '"captured_covered"' rd/rd.json && { echo "FAILED: coverage of a closed capture"; failures=$((failures + 1)); }
+
 # Events and endurance: a capture of their own, the same again with the same options.
 expect 0 "followed, %" "$lab" events --motion calm --frames 4 --vertices 800
 "$lab" events --motion fast --first-frame 40 --frames 6 --vertices 800 --json >events.json 2>/dev/null

@@ -69,6 +69,7 @@ TEST(RdPoint, comes_back_from_json_as_it_was) {
     point.fps = 25;
     point.frames[0].bytes[Layer::distance_orders] = 3;
     point.frames[0].m1_mm = 1.5;
+    point.frames[1].covered_region_mm = 4.5;
     point.frames[1].decode_ms.reset();
     const auto json = to_json(point);
     const auto back = rd_point_from_json(nlohmann::json::parse(json.dump()));
@@ -76,6 +77,7 @@ TEST(RdPoint, comes_back_from_json_as_it_was) {
     EXPECT_EQ(json, to_json(*back));
     EXPECT_EQ(3u, back->frames[0].bytes[Layer::distance_orders]);
     EXPECT_EQ(1.5, back->frames[0].m1_mm);
+    EXPECT_EQ(4.5, back->frames[1].covered_region_mm);
     EXPECT_FALSE(back->frames[1].decode_ms);
 }
 
@@ -133,6 +135,47 @@ TEST(TakeFrameMeasures, worst_regions_of_i_frames_and_of_others_and_what_patches
     EXPECT_DOUBLE_EQ(0.04 / 3, point.values.at("patched_share"));
     const std::string table = region_table(std::vector{point});
     EXPECT_NE(std::string::npos, table.find("2.000       5.000         1.333")) << table;
+}
+
+TEST(TakeMeasures, coverage_where_it_was_asked_for_and_errors_over_it_where_something_is_covered) {
+    ComparisonSummary summary;
+    summary.captured_covered = 0.9;
+    summary.shown_covered = 0.8;
+    summary.covered_m2_mm = 1.5;
+    CompareOptions options;
+    options.points = options.surface = options.cloud = options.pictures = false;
+    std::map<std::string, double> values;
+    take_measures(summary, options, values);
+    EXPECT_TRUE(values.empty());
+    options.coverage = true;
+    take_measures(summary, options, values);
+    EXPECT_EQ((std::map<std::string, double>{{"captured_covered", 0.9}, {"shown_covered", 0.8}}), values);
+    summary.has_covered = true;
+    take_measures(summary, options, values);
+    EXPECT_EQ(1.5, values.at("covered_m2_mm"));
+}
+
+TEST(CoverageTable, has_a_row_for_each_point_that_was_measured) {
+    auto point = point_of("htvm-t", 50, 100, 1);
+    EXPECT_EQ("", coverage_table(std::vector{point}));
+    for (const double worst : {2.0, 7.0, 3.0}) {
+        point.frames.push_back(frame_of(FrameType::tracked, 100, 10));
+        point.frames.back().covered_region_mm = worst;
+    }
+    point.values["captured_covered"] = 0.9125;
+    point.values["shown_covered"] = 1;
+    point.values["covered_m2_mm"] = 1.25;
+    take_frame_measures(point);
+    EXPECT_EQ(7, point.values.at("covered_region_p99_mm"));
+    const std::string table = coverage_table(std::vector{point});
+    EXPECT_NE(std::string::npos, table.find("91.25    100.00         1.250         7.000")) << table;
+}
+
+TEST(EqualM2, is_over_what_is_covered_where_that_was_measured) {
+    auto point = point_of("htvm-t", 50, 100, 1);
+    EXPECT_STREQ("m2_mm", equal_m2_measure(std::vector{point}).key);
+    point.values["covered_m2_mm"] = 1;
+    EXPECT_STREQ("covered_m2_mm", equal_m2_measure(std::vector{point}).key);
 }
 
 TEST(TakeFrameMeasures, nothing_of_frames_by_themselves_that_were_not_measured) {

@@ -15,11 +15,6 @@ FrameInfo sent(FrameType type, std::uint32_t triangles) {
     return info;
 }
 
-TEST(SurfaceArea, OfASquareIsItsSidesProduct) {
-    const Mesh plane = shapes::plane(30, 3, 7);
-    EXPECT_DOUBLE_EQ(surface_area(plane.positions, plane.triangles), 900);
-}
-
 TEST(RecodedShare, OfAPatchedFrameIsThePatchBehindWhatStays) {
     // Four unit squares; then the last two become two triangles of half of 3 x 1 each.
     Mesh mesh = shapes::plane(2, 2, 0);
