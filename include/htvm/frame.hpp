@@ -53,11 +53,11 @@ enum class Layer : std::uint8_t {
     distance_orders = 9,
     external_intra = 10,  // a whole mesh, coded by another coder
     coded_bones = 11,
-    tracked = 12,  // a T-frame's payload
-    removed = 13,  // what a patch takes out
-    border = 14,   // where a patch is joined
-    charts = 15,   // how triangles lie in the texture's picture
-    presence = 16, // which vertices are there
+    tracked = 12,   // a T-frame's payload
+    removed = 13,   // what a patch takes out
+    border = 14,    // where a patch is joined
+    charts = 15,    // how triangles lie in the texture's picture
+    presence = 16,  // which vertices are there
 };
 
 struct LayerName {

@@ -121,8 +121,8 @@ struct DeformableMesh {
     std::vector<VertexFan> sample_fans;    // one per sample, at rest
     std::vector<Point3f> sample_normals;
     std::vector<std::uint8_t> sample_from_border;  // one per sample: edges_from_border(); none unless options.open
-    std::vector<SampleTexture> sample_textures;  // one per sample, or none if nothing is textured
-    float sample_gap = 0;                        // approximate spacing of neighbouring samples
+    std::vector<SampleTexture> sample_textures;    // one per sample, or none if nothing is textured
+    float sample_gap = 0;                          // approximate spacing of neighbouring samples
     DeformationLevel fine, coarse;
     std::vector<SampleBlend> groups;  // how each handle follows the groups
 };

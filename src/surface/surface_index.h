@@ -230,7 +230,7 @@ public:
 
     std::vector<Point3f> positions;  // of the mesh's vertices
     std::vector<Triangle> triangles;
-    std::vector<Colour> colours;  // one per vertex, or none
+    std::vector<Colour> colours;            // one per vertex, or none
     std::vector<std::uint8_t> from_border;  // of each vertex: edges_from_border(); or none: nobody asks for borders
     // For searches by direction; empty if there are none:
     TrianglesAround around;              // each vertex

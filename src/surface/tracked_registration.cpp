@@ -227,13 +227,13 @@ struct MatchSearch {
     const SurfaceIndex& target;
     const Round& round;
     float reach, agreement;
-    float target_gap;  // spacing of the target's vertices, or in far rounds of its samples
-    float sample_gap;  // spacing of the moved samples
-    std::size_t skip;  // of the target's samples, every how many-th is matched back
+    float target_gap;                       // spacing of the target's vertices, or in far rounds of its samples
+    float sample_gap;                       // spacing of the moved samples
+    std::size_t skip;                       // of the target's samples, every how many-th is matched back
     std::vector<std::uint8_t> from_border;  // of the moved samples, or none
     std::span<const std::uint8_t> present;  // DeformationOptions::present
     float unseen_reach;
-    MovedGrid grid;    // of the moved samples
+    MovedGrid grid;  // of the moved samples
 };
 
 bool agrees(const MatchSearch& search, const Point3f& a, const Point3f& b) {

@@ -49,9 +49,9 @@ struct ShownFrame {
     std::uint32_t texcoords_topology = 0;  // topology number of the frame they belong to
     std::span<const Triangle> triangles;
     std::span<const Colour> colours;
-    std::vector<Colour> own_colours;     // where vertices are repeated
+    std::vector<Colour> own_colours;      // where vertices are repeated
     std::vector<Triangle> own_triangles;  // where some are not there
-    LatticeMesh own;                  // the mesh of a frame that shares nothing with its reference
+    LatticeMesh own;                      // the mesh of a frame that shares nothing with its reference
     Pose pose;
 };
 

@@ -25,7 +25,7 @@ struct Configuration {
     Scale scale;
     FrameSteps steps;  // of the options, where neither a rate nor an error decides
     bool tells_presence() const { return header.version >= presence_version; }  // surface comes and goes
-    bool intra_only() const { return options.key_interval == 1; }  // no frame refers to another
+    bool intra_only() const { return options.key_interval == 1; }               // no frame refers to another
 };
 
 // Completes the configuration, whose options and threads are set, from the first frame: the origin of the lattice, the

@@ -303,8 +303,9 @@ constexpr Option list[] = {
     {.name = "tracked.presence",
      .group = OptionGroup::tracked,
      .kind = OptionKind::word,
-     .meaning = "surface that comes and goes, as where depth cameras see a person from some sides: auto, frames say what "
-                "is there if the first mesh has borders; on, they do; off, all of a reference is always there",
+     .meaning =
+         "surface that comes and goes, as where depth cameras see a person from some sides: auto, frames say what "
+         "is there if the first mesh has borders; on, they do; off, all of a reference is always there",
      .words = surface_presence,
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.presence); },
      .set = [](EncoderOptions& o, double value) { o.tracked.presence = static_cast<SurfacePresence>(value); },
@@ -312,8 +313,9 @@ constexpr Option list[] = {
     {.name = "tracked.fill",
      .group = OptionGroup::tracked,
      .kind = OptionKind::word,
-     .meaning = "where surface comes and goes, holes that open for a moment in what was seen around them: auto, they are "
-                "filled by what is known; off, they are shown",
+     .meaning =
+         "where surface comes and goes, holes that open for a moment in what was seen around them: auto, they are "
+         "filled by what is known; off, they are shown",
      .words = hole_filling,
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.fill); },
      .set = [](EncoderOptions& o, double value) { o.tracked.fill = static_cast<HoleFilling>(value); },
@@ -321,8 +323,9 @@ constexpr Option list[] = {
     {.name = "tracked.specks",
      .group = OptionGroup::tracked,
      .kind = OptionKind::word,
-     .meaning = "where surface comes and goes, small parts that hang on nothing: auto, they are left out; keep, they are "
-                "shown",
+     .meaning =
+         "where surface comes and goes, small parts that hang on nothing: auto, they are left out; keep, they are "
+         "shown",
      .words = specks,
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.specks); },
      .set = [](EncoderOptions& o, double value) { o.tracked.specks = static_cast<Specks>(value); },

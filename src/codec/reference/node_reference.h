@@ -34,8 +34,8 @@ struct NodeReference {
     NodeGraph graph;
     VertexHierarchy hierarchy;
     CapturedCounts captured;  // what the I-frame was captured with; make_node_reference() does not know it
-    // Where the stream tells what is there (tracked/presence.h), which make_node_reference() does not know either: which
-    // vertices of the mesh are, and those around each.
+    // Where the stream tells what is there (tracked/presence.h), which make_node_reference() does not know either:
+    // which vertices of the mesh are, and those around each.
     bool has_presence = false;
     Presence presence;
     VerticesAround around;

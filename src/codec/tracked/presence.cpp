@@ -77,7 +77,10 @@ Presence code_presence(Coder& coder, const VerticesAround& around, std::span<con
             if (out[u] != 0 && before[u] == 0) ++came;
             if (out[u] == 0 && before[u] == 1) ++left;
         }
-        const auto beside = there + missing == 0 ? none_coded : missing == 0 ? all_there : there == 0 ? none_there : mixed;
+        const auto beside = there + missing == 0 ? none_coded
+                            : missing == 0       ? all_there
+                            : there == 0         ? none_there
+                                                 : mixed;
         const auto changes = came == left ? unchanged : came > left ? some_came : some_left;
         auto& model = models.of(before[v], nearness[v], beside, changes);
         out[v] = coder.bit(model, !wanted.empty() && wanted[v] != 0) ? 1 : 0;
@@ -152,7 +155,9 @@ Presence presence_of_patched(std::span<const std::uint8_t> presence, std::span<c
     return out;
 }
 
-bool anything_absent(std::span<const std::uint8_t> presence) { return std::ranges::find(presence, 0) != presence.end(); }
+bool anything_absent(std::span<const std::uint8_t> presence) {
+    return std::ranges::find(presence, 0) != presence.end();
+}
 
 void triangles_shown(std::span<const Triangle> triangles, std::span<const std::uint8_t> presence,
                      std::vector<Triangle>& out) {

@@ -18,7 +18,8 @@
 
 namespace htvm::internal {
 
-// Behind both sides of a group's frame (tracked/frame_group.h): one of the two frames has the vertex, the other has not.
+// Behind both sides of a group's frame (tracked/frame_group.h): one of the two frames has the vertex, the other has
+// not.
 inline constexpr std::uint8_t doubtful_presence = 2;
 
 // presence: 0 or 1 for each vertex of the mesh whose neighbours `around` are. before: what is known of it, one per

@@ -1,8 +1,9 @@
 // A T-frame's payload from version 3 of the stream on: one run of the range coder, without any table. First the head,
 // which says how the layers are quantised; from presence_version on which vertices are there; then node motion,
-// displacement and, where the reference has colours, their change. Counts, attributes and what predicts each layer follow from the reference, and what is as in the frame before
-// takes a bit. Colours of many bytes are a run of their own behind the first, so that two threads read side by side.
-// (Versions 1 and 2 have a run for each layer, in a payload like those of other frames.)
+// displacement and, where the reference has colours, their change. Counts, attributes and what predicts each layer
+// follow from the reference, and what is as in the frame before takes a bit. Colours of many bytes are a run of their
+// own behind the first, so that two threads read side by side. (Versions 1 and 2 have a run for each layer, in a
+// payload like those of other frames.)
 #pragma once
 
 #include <cstddef>

@@ -8,7 +8,9 @@
 #include <map>
 #include <numeric>
 
+#include "core/disjoint_sets.h"
 #include "core/parallel.h"
+#include "surface/hole_filling.h"
 #include "surface/open_border.h"
 #include "surface/simplification.h"
 #include "surface/surface_index.h"
@@ -274,7 +276,7 @@ bool is_beyond_border(const SurfacePoint& found, const Triangle& corners, std::s
 // What lies beyond the captured surface's border is not found.
 void leave_out_what_is_beyond(const SurfaceSamples& samples, const SurfaceIndex& surface,
                               std::vector<SurfacePoint>& targets) {
-    const float slip = 0.35F * surface.fine_gap;
+    const float slip = 0.7F * surface.fine_gap;
     for (std::size_t i = 0; i < targets.size(); ++i)
         if (targets[i].found() && is_beyond_border(targets[i], surface.triangles[targets[i].triangle],
                                                    surface.from_border, samples.points[i], samples.normals[i], slip))
@@ -346,7 +348,9 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
     if (!surface.from_border.empty()) {
         leave_out_what_is_beyond(samples, surface, targets);
         out.seen.resize(vertices);
-        for (std::size_t v = 0; v < vertices; ++v) out.seen[v] = targets[v].found() ? 1 : 0;
+        const auto far = static_cast<float>(how.far.value);
+        for (std::size_t v = 0; v < vertices; ++v)
+            if (targets[v].found()) out.seen[v] = targets[v].squared_distance > far * far ? 2 : 1;
     }
     const auto fit = make_surface_fit(moved, rule, targets);
     const auto fitted = fit.fitted(seen_at(samples, moved, rule, captured, targets, threads));
@@ -474,7 +478,9 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
     return {LatticeUnits(std::sqrt(squares / count)),
             static_cast<double>(strays) / count,
             LatticeUnits(cube_errors(points, squared, options.region, fewest, left_out).worst()),
-            {}, 0, {}};
+            {},
+            0,
+            {}};
 }
 
 // The captured surface's normals tell the two sides of, say, a sleeve apart. near: of each sample a captured vertex
@@ -510,21 +516,20 @@ FromCaptured distances_of_captured(const SurfaceSamples& captured, std::span<con
         const auto found = decoded.closest_within(captured.points[i], reach, guess);
         if (found.found()) out.squared[i] = std::min(out.squared[i], static_cast<double>(found.squared_distance));
         if (open)
-            out.uncovered[i] = !found.found() || is_beyond_border(found, decoded.triangles[found.triangle],
-                                                                  decoded.from_border, captured.points[i],
-                                                                  captured.normals[i], decoded.fine_gap);
+            out.uncovered[i] =
+                !found.found() || is_beyond_border(found, decoded.triangles[found.triangle], decoded.from_border,
+                                                   captured.points[i], captured.normals[i], decoded.fine_gap);
     };
     // Guesses may decide what is found, so they must not depend on how the threads cut the range.
     constexpr std::size_t in_a_row = 256;
-    parallel_for((out.squared.size() + in_a_row - 1) / in_a_row, options.threads, 2,
-                 [&](std::size_t begin, std::size_t end) {
-                     for (std::size_t row = begin; row < end; ++row) {
-                         std::uint32_t guess = OrientedPoints::no_point;
-                         for (std::size_t i = row * in_a_row; i < std::min(out.squared.size(), (row + 1) * in_a_row);
-                              ++i)
-                             look(i, guess);
-                     }
-                 });
+    parallel_for(
+        (out.squared.size() + in_a_row - 1) / in_a_row, options.threads, 2, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t row = begin; row < end; ++row) {
+                std::uint32_t guess = OrientedPoints::no_point;
+                for (std::size_t i = row * in_a_row; i < std::min(out.squared.size(), (row + 1) * in_a_row); ++i)
+                    look(i, guess);
+            }
+        });
     return out;
 }
 
@@ -643,6 +648,18 @@ LatticeMesh with_fewer_vertices(const LatticeMesh& captured, bool keep_tips,
     return out;
 }
 
+// Takes away parts that are smaller than a square of this side.
+void leave_out_specks(LatticeMesh& mesh, LatticeUnits side) {
+    DisjointSets parts(mesh.positions.size());
+    std::vector<double> area(mesh.positions.size(), 0);
+    for (const auto& t : mesh.triangles) parts.join(t[0], t[1]), parts.join(t[1], t[2]);
+    for (const auto& t : mesh.triangles)
+        area[parts.of(t[0])] += length(area_vector(std::span<const LatticePoint>(mesh.positions), t)) / 2;
+    const double least = side.value * side.value;
+    if (std::ranges::all_of(mesh.triangles, [&](const Triangle& t) { return area[parts.of(t[0])] < least; })) return;
+    std::erase_if(mesh.triangles, [&](const Triangle& t) { return area[parts.of(t[0])] < least; });
+}
+
 // Moves the vertices, and sets their colours, so that the triangles between them come as near as possible to the
 // captured surface: the collapses placed each vertex for itself alone.
 void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const SurfaceIndex& surface,
@@ -667,7 +684,13 @@ LatticeMesh simplified_piece(const LatticeMesh& piece, const LatticeMesh& captur
 LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex& surface,
                                  const SimplifiedReferenceOptions& options) {
     if (captured.triangles.empty() || !captured.texcoords.empty()) return captured;
-    auto out = with_fewer_vertices(welded(captured, at_same_place(captured)), true, options);
+    auto whole = welded(captured, at_same_place(captured));
+    if (options.specks.value > 0) leave_out_specks(whole, options.specks);
+    if (options.filled_holes.value > 0) {
+        whole.normals.clear();
+        fill_small_holes(whole, {.longest = options.filled_holes});
+    }
+    auto out = with_fewer_vertices(whole, true, options);
     fit_to_surface(out, captured, surface, options);
     if (!captured.normals.empty()) out.normals = quantised_normals(vertex_normals(out.positions, out.triangles));
     return out;

@@ -32,8 +32,9 @@ struct MovedReference {
 
 struct TrackedTargets {
     std::vector<std::uint32_t> near;  // of each vertex, the captured vertex beside it, or OrientedPoints::no_point
-    std::vector<std::uint8_t> seen;  // of each vertex whether it lies beside captured surface, not beyond a border of
-                                     // it; none where the surface's borders are not known
+    // Of each vertex whether it lies beside captured surface, not beyond a border of it: 1, or 2 if that is too far off
+    // for it to be shown; none where the surface's borders are not known.
+    std::vector<std::uint8_t> seen;
     std::vector<std::int32_t> displacement;  // one per vertex, in lattice units along its normal
     std::vector<std::int32_t> colours;       // three per vertex, levels to add; empty if the reference has no colours
 };
@@ -44,6 +45,7 @@ enum class TargetSamples : std::uint8_t { middles, three };
 struct TargetSearch {
     // Vertices without a surface within it take the values of their neighbours.
     LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.reach);
+    LatticeUnits far = Scale{}.on_lattice(tracking_numbers.far_from_seen);  // TrackedTargets::seen
     TargetSamples samples = TargetSamples::middles;
     Threads threads = {};
 };
@@ -76,7 +78,7 @@ struct TrackedFit {
     LatticeUnits worst_region;    // the RMS distance in the worst cube of space
     std::vector<double> squared;  // squared distances of the decoded mesh's samples from the captured surface
     // Of surface that comes and goes, which counts as uncovered, not as far off, where nothing is tracked beside it:
-    double uncovered_share = 0;    // of the captured samples
+    double uncovered_share = 0;     // of the captured samples
     LatticeUnits widest_uncovered;  // side of a square as large as what is uncovered in one cube
 };
 
@@ -93,9 +95,9 @@ struct TrackedFitOptions {
 
 // captured: index of the captured mesh. near: TrackedTargets::near of the frame's targets, or nothing. intra_squared:
 // `squared` of the I-frame whose connectivity `decoded` has, or empty for the I-frame itself. Errors that the I-frame
-// had at a sample do not count against the frame, since the search misses some long triangles, as those of a sole. Where
-// the borders of the captured surface are known, what lies at one does not count, nor what lies beyond one of the decoded
-// mesh.
+// had at a sample do not count against the frame, since the search misses some long triangles, as those of a sole.
+// Where the borders of the captured surface are known, what lies at one does not count, nor what lies beyond one of the
+// decoded mesh.
 TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
                                std::span<const std::uint32_t> near, std::span<const double> intra_squared,
                                const TrackedFitOptions& options);
@@ -110,6 +112,8 @@ struct SimplifiedReferenceOptions {
     double colour_error = tracking_numbers.simplified_colours * usual_request.colour_step;  // levels, > 0
     LatticeUnits longest_edge = Scale{}.on_lattice(tracking_numbers.longest_edge);          // > 0
     LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.reach);  // how far to search for the captured surface
+    LatticeUnits filled_holes;  // rim of the longest hole that is closed; 0: none is
+    LatticeUnits specks;        // side of a square: parts of the surface that are smaller are left out; 0: none is
     Threads threads = {};
 };
 

@@ -16,7 +16,7 @@ constexpr float at_first = 0.7F;  // score of what was captured once
 std::vector<float> seen_around(std::span<const std::uint8_t> seen, const VerticesAround& around) {
     constexpr int rounds = 2;
     std::vector<float> now(seen.size()), next(seen.size());
-    for (std::size_t v = 0; v < seen.size(); ++v) now[v] = seen[v] != 0 ? 1.0F : 0.0F;
+    for (std::size_t v = 0; v < seen.size(); ++v) now[v] = seen[v] == 1 ? 1.0F : 0.0F;
     for (int round = 0; round < rounds; ++round) {
         for (std::size_t v = 0; v < now.size(); ++v) {
             float sum = now[v];
@@ -77,15 +77,15 @@ void hide_specks(const TrackedPlace& tracked, const PresenceOptions& options, Pr
 
 PresenceHistory judge_presence(std::span<const std::uint8_t> seen, const TrackedPlace& tracked,
                                const PresenceHistory& before, const PresenceOptions& options) {
-    constexpr float gain = 0.6F, comes_from = 0.55F, goes_below = 0.3F;
+    constexpr float gain = 0.6F, comes_from = 0.5F, goes_below = 0.25F;
     constexpr auto most_unseen = std::numeric_limits<std::uint16_t>::max();
     const auto was = before.score.empty() ? first_history(tracked) : before;
     const auto share = seen_around(seen, tracked.around);
     PresenceHistory out = was;
     for (std::size_t v = 0; v < seen.size(); ++v) {
         out.score[v] += gain * (share[v] - out.score[v]);
-        out.unseen[v] = seen[v] != 0 ? std::uint16_t{0}
-                                     : static_cast<std::uint16_t>(std::min<int>(was.unseen[v] + 1, most_unseen));
+        out.unseen[v] =
+            seen[v] == 1 ? std::uint16_t{0} : static_cast<std::uint16_t>(std::min<int>(was.unseen[v] + 1, most_unseen));
         out.shown[v] = out.score[v] > (was.shown[v] != 0 ? goes_below : comes_from) ? 1 : 0;
     }
     if (options.fill) fill_new_holes(tracked, was, options, out);

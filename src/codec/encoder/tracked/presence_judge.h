@@ -1,7 +1,7 @@
 // What of the tracked reference is shown in a frame. Seen is not shown: at the rims of a depth camera's view and in its
-// shadows surface comes and goes from frame to frame, which is noise, not motion. So what was seen is averaged along the
-// surface and over time; a hole that opens for a moment within what is seen is filled by what is known, and specks are
-// left out.
+// shadows surface comes and goes from frame to frame, which is noise, not motion. So what was seen is averaged along
+// the surface and over time; a hole that opens for a moment within what is seen is filled by what is known, and specks
+// are left out.
 #pragma once
 
 #include <cstdint>
@@ -24,10 +24,10 @@ struct PresenceHistory {
 };
 
 struct PresenceOptions {
-    bool fill = true;             // whether what is known fills holes that open for a moment
+    bool fill = true;              // whether what is known fills holes that open for a moment
     bool leave_out_specks = true;  // whether small parts that hang on nothing are not shown
-    LatticeUnits speck{320};      // side of a square: smaller parts are specks
-    int hold = 15;                // frames for which a hole is filled
+    LatticeUnits speck{320};       // side of a square: smaller parts are specks
+    int hold = 15;                 // frames for which a hole is filled
 };
 
 // What is tracked, as it lies in the frame.
@@ -38,7 +38,7 @@ struct TrackedPlace {
     std::span<const std::uint8_t> of_reference;  // what was there of the reference itself: Presence
 };
 
-// seen: of each vertex whether it lies on captured surface. The history's `shown` is what to send.
+// seen: TrackedTargets::seen. The history's `shown` is what to send.
 PresenceHistory judge_presence(std::span<const std::uint8_t> seen, const TrackedPlace& tracked,
                                const PresenceHistory& before, const PresenceOptions& options);
 

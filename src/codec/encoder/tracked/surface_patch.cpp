@@ -361,8 +361,7 @@ std::vector<double> errors_around(std::span<const Point3f> points, std::span<con
     std::vector<double> squared, of_capture;
     for (const double distance : error) squared.push_back(distance * distance);
     for (std::uint32_t v = 0; v < capture.on_decoded.size(); ++v) {
-        const double distance =
-            capture.at_ragged_rim(v) ? 0 : distance_to(capture.on_decoded[v], options.reach).value;
+        const double distance = capture.at_ragged_rim(v) ? 0 : distance_to(capture.on_decoded[v], options.reach).value;
         of_capture.push_back(distance * distance);
     }
     const auto back = cube_errors(points, squared, options.region, fewest),

@@ -112,8 +112,9 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
     const auto lost = std::min(allowed_in_region(work, work.sequence.history.best_fit),
                                numbers.lost_in_steps * LatticeUnits(steps.geometry));
     StageClock measuring(work.stages);
-    const SurfacePatchSearch search({tracked.mesh, reference.decoded.by_nodes->mesh.positions, tracked.near, tracked.seen},
-                                    work.captured.mesh, work.surface, patch_options(work, steps));
+    const SurfacePatchSearch search(
+        {tracked.mesh, reference.decoded.by_nodes->mesh.positions, tracked.near, tracked.seen}, work.captured.mesh,
+        work.surface, patch_options(work, steps));
     measuring.done("patch");
     for (const auto region_lost : {lost, LatticeUnits(0)}) {
         StageClock clock(work.stages);
@@ -140,7 +141,8 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
 bool should_grow(const TrackedWork& work, const TrackedFit& fit) {
     const auto since = std::int64_t{work.sequence.next_frame} - work.reference->decoded.number;
     const auto wide = work.configuration.scale.on_lattice(numbers.grown_from);
-    return fit.uncovered_share > numbers.much_uncovered || (since >= numbers.grown_after && fit.widest_uncovered > wide);
+    return fit.uncovered_share > numbers.much_uncovered ||
+           (since >= numbers.grown_after && fit.widest_uncovered > wide);
 }
 
 // ---- The steps of a choice ------------------------------------------------------------------------------------------

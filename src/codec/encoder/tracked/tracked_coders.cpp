@@ -81,8 +81,7 @@ Presence presence_by_place(const IntraSource& source, const LatticeMesh& coded, 
         if (source.presence[v] != 0) there.push_back(to_grid(source.mesh.positions[v], step));
     std::ranges::sort(there);
     Presence out;
-    for (const auto& p : coded.positions)
-        out.push_back(std::ranges::binary_search(there, to_grid(p, step)) ? 1 : 0);
+    for (const auto& p : coded.positions) out.push_back(std::ranges::binary_search(there, to_grid(p, step)) ? 1 : 0);
     return out;
 }
 
@@ -197,6 +196,10 @@ SimplifiedReferenceOptions simplification_options(const Configuration& configura
     out.longest_edge = configuration.scale.on_lattice(tracking_numbers.longest_edge);
     out.reach = configuration.scale.on_lattice(tracking_numbers.reach);
     out.threads = configuration.threads;
+    if (!configuration.tells_presence()) return out;
+    const auto presence = presence_options(configuration);
+    if (presence.fill) out.filled_holes = configuration.scale.on_lattice(tracking_numbers.filled_hole);
+    if (presence.leave_out_specks) out.specks = presence.speck;
     return out;
 }
 

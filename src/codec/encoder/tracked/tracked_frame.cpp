@@ -85,8 +85,7 @@ TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, cons
     ends.colour = run.position();
     out.payload = run.finish();
     // The four bytes that are read ahead of the head must not be the colours'.
-    if (!colour_run.empty())
-        out.payload.resize(std::max(out.payload.size(), std::max(ends.head, ends.presence) + 4));
+    if (!colour_run.empty()) out.payload.resize(std::max(out.payload.size(), std::max(ends.head, ends.presence) + 4));
     out.payload.insert(out.payload.end(), colour_run.begin(), colour_run.end());
     out.shares = layer_shares(ends, out.payload.size(), colour_run.size());
     return out;
@@ -202,7 +201,10 @@ TrackedTargets targets_of(const FrameSource& source, const MovedSurface& moved) 
     }
     return find_tracked_targets(
         {moved.positions, moved.normals, reference.mesh.triangles, reference.mesh.colours}, captured, surface,
-        {.reach = options.reach, .samples = options.target_samples, .threads = options.threads},
+        {.reach = options.reach,
+         .far = options.scale.on_lattice(tracking_numbers.far_from_seen),
+         .samples = options.target_samples,
+         .threads = options.threads},
         options.near.empty() ? registered.form.matches
                              : std::vector<std::uint32_t>(options.near.begin(), options.near.end()));
 }
@@ -239,9 +241,9 @@ void judge(const FrameSource& source, const MovedSurface& moved, EncodedTrackedF
         out.seen = out.state.presence;
         return;
     }
-    out.presence = judge_presence(out.seen,
-                                  {moved.positions, reference.mesh.triangles, reference.around, reference.presence},
-                                  history, options.presence_options);
+    out.presence =
+        judge_presence(out.seen, {moved.positions, reference.mesh.triangles, reference.around, reference.presence},
+                       history, options.presence_options);
     out.state.presence = out.presence.shown;
 }
 

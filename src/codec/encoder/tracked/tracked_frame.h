@@ -86,7 +86,8 @@ struct PresenceToWrite {
     const VerticesAround& around;
     std::span<const std::uint8_t> before, presence;
 };
-// The payload of decisions. presence: null in streams that do not tell it. least_run: bytes from which on the colours are a run of their own; sets head.colour_run.
+// The payload of decisions. presence: null in streams that do not tell it. least_run: bytes from which on the colours
+// are a run of their own; sets head.colour_run.
 TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, const TrackedDecisions& decisions,
                                const PresenceToWrite* presence, std::size_t least_run);
 

@@ -38,10 +38,9 @@ void register_next(const TrackedWork& work, const Tracking& tracking, const Trac
                    TrackedStrategy::Waiting& next, std::vector<StageTime>& stages) {
     find_surface(work.configuration, next, stages);
     if (assumed.nodes && !tracking.lost && can_be_moved(work.sequence, next.captured.mesh))
-        next.ahead.registered =
-            register_frame(work.configuration, *work.reference, *next.ahead.surface, next.captured,
-                           {assumed.nodes->motion, work.sequence.history.last, {}, {}}, present(work.sequence, true),
-                           stages, &tracking.lost);
+        next.ahead.registered = register_frame(work.configuration, *work.reference, *next.ahead.surface, next.captured,
+                                               {assumed.nodes->motion, work.sequence.history.last, {}, {}},
+                                               present(work.sequence, true), stages, &tracking.lost);
 }
 
 }  // namespace

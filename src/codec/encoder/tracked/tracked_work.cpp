@@ -77,7 +77,8 @@ const NodeRegistration& register_once(const TrackedWork& work, Tracking& trackin
     if (!tracking.registered) {
         const auto& history = work.sequence.history;
         tracking.registered = register_frame(work.configuration, *work.reference, work.surface, work.captured,
-                                             {history.last, history.before_last, history.gone_on, {}}, present(work.sequence), work.stages);
+                                             {history.last, history.before_last, history.gone_on, {}},
+                                             present(work.sequence), work.stages);
     }
     return *tracking.registered;
 }
@@ -89,9 +90,9 @@ FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered,
     FoundLimbs out{std::move(registered)};
     auto options = deformation_options(work.configuration, work.effort);
     options.present = present(work.sequence);
-    out.any = follow_lost_limbs(work.reference->deformable, work.surface,
-                                {history.last, history.before_last, history.gone_on, skeletal}, options,
-                                out.registered);
+    out.any =
+        follow_lost_limbs(work.reference->deformable, work.surface,
+                          {history.last, history.before_last, history.gone_on, skeletal}, options, out.registered);
     clock.done("registration");
     return out;
 }

@@ -89,7 +89,7 @@ struct TrackedIntra {
     std::int32_t step = 1;  // Reference::step
     CodedPose pose;
     PresenceHistory presence = {};  // MotionHistory::presence, of a renewed one
-    LatticeUnits best_fit;  // MotionHistory::best_fit, which lasts as long as tracking does; 0: it begins anew
+    LatticeUnits best_fit;          // MotionHistory::best_fit, which lasts as long as tracking does; 0: it begins anew
 };
 // A TP-frame, which becomes the reference.
 struct TrackedPatch {
@@ -141,8 +141,8 @@ SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame&
 // coded, what was there before that one. One per vertex, or none: all is. behind: of the frame behind the next one.
 std::span<const std::uint8_t> present(const TrackedSequence& sequence, bool behind = false);
 
-// Registers the reference's nodes to a captured surface. starts: but for the skeleton's. presence: what of the reference
-// was seen lately. in_vain: may end it early.
+// Registers the reference's nodes to a captured surface. starts: but for the skeleton's. presence: what of the
+// reference was seen lately. in_vain: may end it early.
 NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
                                 const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
                                 std::span<const std::uint8_t> presence, std::vector<StageTime>& stages,
