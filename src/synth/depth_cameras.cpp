@@ -173,6 +173,29 @@ View look(const DepthCamera& camera, const std::vector<Vector3f>& positions, con
     return view;
 }
 
+// Which triangles the image shows within the sensor's reach. Those that are too steep to fall on a place of a pixel are
+// seen if they face the camera, and their corners belong to others that are.
+std::vector<std::uint8_t> seen_triangles(const DepthCamera& camera, const DepthSensorModel& model, const View& view,
+                                         const SynthFrame& made) {
+    const auto& triangles = made.mesh.triangles;
+    std::vector<std::uint8_t> seen(triangles.size()), touched(made.true_positions.size());
+    for (std::size_t i = 0; i < view.triangles.size(); ++i)
+        if (view.triangles[i] != nothing && view.inverse[i] * model.nearest <= 1 &&
+            view.inverse[i] * model.farthest >= 1)
+            seen[view.triangles[i]] = 1;
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        if (seen[t])
+            for (const std::uint32_t corner : triangles[t]) touched[corner] = 1;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        const auto& [i, j, k] = triangles[t];
+        if (seen[t] || !touched[i] || !touched[j] || !touched[k]) continue;
+        const Vector3d a = to_eigen(made.true_positions[i]), b = to_eigen(made.true_positions[j]),
+                       c = to_eigen(made.true_positions[k]);
+        seen[t] = (b - a).cross(c - a).dot(camera.position - a) > 0 ? 1 : 0;
+    }
+    return seen;
+}
+
 // ---- What lies before a pixel ---------------------------------------------------------------------------------------
 
 // The part of a pixel's places that is within `step` of the nearest is the front.
@@ -281,11 +304,7 @@ Sheet sheet_of(const DepthCamera& camera, const DepthCameraOptions& options, con
     const DepthSensorModel& model = model_of(options.sensor);
     const View view = look(camera, made.true_positions, made.mesh.triangles);
     Sheet sheet;
-    sheet.seen.resize(made.mesh.triangles.size());
-    for (std::size_t i = 0; i < view.triangles.size(); ++i)
-        if (view.triangles[i] != nothing && view.inverse[i] * model.nearest <= 1 &&
-            view.inverse[i] * model.farthest >= 1)
-            sheet.seen[view.triangles[i]] = 1;
+    sheet.seen = seen_triangles(camera, model, view, made);
     const auto pixels = pixels_of(camera, view, made, scene);
     const auto depths = measured_depths(model, pixels, view.width, options.noise, key);
     std::vector<std::uint32_t> vertices(depths.size(), nothing);
@@ -332,9 +351,13 @@ double camera_distance(const SynthOptions& options, const DepthCameraOptions& ca
 }
 
 int body_vertices(const DepthCameraOptions& options) {
-    const int own = options.sensor == DepthSensor::phone ? 80000 : 40000;
-    const int of_each = options.vertices / std::clamp(options.cameras, 1, most_cameras);
-    return std::max(own, std::min(3 * of_each, most_vertices));
+    const bool is_phone = options.sensor == DepthSensor::phone;
+    const int usual = is_phone ? 80000 : 40000;
+    if (options.vertices <= 0) return usual;
+    const double of_each = 1.0 * options.vertices / std::clamp(options.cameras, 1, most_cameras);
+    const double finer = of_each / (is_phone ? 42000 : 12000);  // than with the sensor's own pixels
+    constexpr double fewest = 20000, most = 1e6;
+    return static_cast<int>(std::clamp(usual * finer, fewest, most));
 }
 
 std::vector<DepthCamera> depth_cameras(const SynthOptions& options, const DepthCameraOptions& cameras, int frame) {

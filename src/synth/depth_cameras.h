@@ -39,7 +39,7 @@ struct DepthCapture {
                                         // Colours, and normals if the frame has them
     std::vector<std::uint32_t> sheets;  // the number of vertices of each camera's sheet
     std::vector<DepthCamera> cameras;
-    std::vector<std::uint8_t> seen;  // for each triangle of the frame's mesh: 1 if a camera's image shows some of it
+    std::vector<std::uint8_t> seen;  // for each triangle of the frame's mesh: 1 if a camera's image shows it
 };
 
 // Fails (bad_input) with what is wrong with the options, if anything.

@@ -25,12 +25,12 @@ constexpr DepthSensorModel kinect = {.width = 512,
                                      .grain = 3,
                                      .depth_step = 1,
                                      .disparity_step = 0,
-                                     .lost = 0.002,
+                                     .lost = 0.004,
                                      .lost_in_the_dark = 0.04,
                                      .least_facing = 0.12,
-                                     .mixed_lost = 0.4,
-                                     .mixed_flying = 0.25,
-                                     .longest_flight = 150};
+                                     .mixed_lost = 0.35,
+                                     .mixed_flying = 0.45,
+                                     .longest_flight = 100};
 
 // The camera on a phone's face, at half of its 480 x 640 pixels, as programs that record with it save. Errors are in
 // the range of millimetres (A. Breitbarth et al., "Measurement accuracy and dependence on external influences of the
@@ -84,15 +84,19 @@ double brightness(const Colour& colour) { return (0.3 * colour[0] + 0.6 * colour
 // Black, and dark grey partly: infrared light does not come back from it.
 double darkness(double bright) { return std::clamp(1 - 4 * bright, 0.0, 1.0); }
 
-// Single pixels and, as often, ragged patches of them.
-bool is_lost(RandomKey key, int x, int y, double share) {
-    if (share >= 1) return true;
-    const double half = 1 - std::sqrt(1 - share);
-    if (random_uniform(derive_key(key, lost_stream), cell_index(x, y)) < half) return true;
+// Uniform in [0, 1), the same in ragged patches of pixels.
+double patchy(RandomKey key, int x, int y) {
     constexpr int patch = 6, shift = 3;  // pixels
     const std::uint64_t bits = random_bits(derive_key(key, shift_stream), cell_index(x, y));
     const int shifted_x = x + static_cast<int>(bits % shift), shifted_y = y + static_cast<int>(bits / shift % shift);
-    return random_uniform(derive_key(key, patch_stream), cell_index(shifted_x / patch, shifted_y / patch)) < half;
+    return random_uniform(derive_key(key, patch_stream), cell_index(shifted_x / patch, shifted_y / patch));
+}
+
+// Single pixels and, as often, patches of them.
+bool is_lost(RandomKey key, int x, int y, double share) {
+    if (share >= 1) return true;
+    const double half = 1 - std::sqrt(1 - share);
+    return random_uniform(key, cell_index(x, y)) < half || patchy(key, x, y) < half;
 }
 
 double stepped(const DepthSensorModel& model, double depth) {
@@ -106,14 +110,17 @@ struct Lit {
     double depth, facing;
 };
 
-// On edges light may come from both sides, and what the sensor makes of it lies between them.
-Lit lit_place(const DepthSensorModel& model, const SeenPixel& pixel, double noise, double chance) {
+// On edges light may come from both sides, and what the sensor makes of it lies between them: further back the more of
+// the pixel, and the brighter, what is behind. Along an edge pixels are lost or fly together.
+Lit lit_place(const DepthSensorModel& model, const SeenPixel& pixel, double noise, RandomKey key, int x, int y) {
     const Lit centre{pixel.centre, pixel.facing};
     if (pixel.cover >= 1) return centre;
+    const double chance = patchy(key, x, y);
     if (chance < noise * model.mixed_lost) return {0, 1};
     if (chance >= noise * (model.mixed_lost + model.mixed_flying)) return centre;
     const double gap = pixel.back > 0 ? pixel.back - pixel.front : model.longest_flight;
-    return {pixel.front + (1 - pixel.cover) * std::min(gap, model.longest_flight), 1};
+    const double behind = 0.5 * patchy(derive_key(key, 0), x, y) + 0.5 * random_uniform(key, cell_index(x, y));
+    return {pixel.front + behind * (1 - pixel.cover) * std::min(gap, model.longest_flight), 1};
 }
 
 }  // namespace
@@ -141,14 +148,14 @@ std::vector<float> measured_depths(const DepthSensorModel& model, const std::vec
         if (pixel.front <= 0) continue;
         const int x = static_cast<int>(i % static_cast<std::size_t>(width)),
                   y = static_cast<int>(i / static_cast<std::size_t>(width));
-        const Lit lit = lit_place(model, pixel, noise, random_uniform(derive_key(key, mixed_stream), i));
+        const Lit lit = lit_place(model, pixel, noise, derive_key(key, mixed_stream), x, y);
         double depth = lit.depth;
         if (depth < model.nearest || depth > model.farthest) continue;
         if (noise > 0) {
             const double bright = brightness(pixel.colour);
             const double share =
                 model.lost + model.lost_in_the_dark * darkness(bright) + facing_loss(model, lit.facing);
-            if (is_lost(key, x, y, noise * share)) continue;
+            if (is_lost(derive_key(key, lost_stream), x, y, noise * share)) continue;
             const double fine = random_gaussian(derive_key(key, fine_stream), i),
                          coarse = grained(derive_key(key, grain_stream), model.grain, x, y);
             const double error =
