@@ -87,7 +87,7 @@ Result<Mesh> true_mesh(TrueMeshes& truth, const MeshSource& original, std::size_
     return std::move(mesh->mesh);
 }
 
-// Whether a frame of the truth and of both sequences follows the one before.
+// Whether a pair of frames follows the one before in both sequences.
 bool follows(const FramePair& pair, const std::optional<FramePair>& before) {
     return before && pair.original == before->original + 1 && pair.decoded == before->decoded + 1;
 }

@@ -30,6 +30,7 @@
 #include "io/skeleton_file.h"
 #include "io/timestamps.h"
 #include "pacing.h"
+#include "synth/depth_cameras.h"
 #include "synth/texture.h"
 #include "synth_truth.h"
 #include "texture_output.h"
@@ -46,7 +47,8 @@ struct Options {
     int frames = 60, first_frame = 0, marks = 1000;
     SynthOptions synth;
     SynthTextureOptions texture;
-    bool is_textured = false;
+    DepthCameraOptions cameras;
+    bool is_textured = false, has_cameras = false;
     ImageFormat texture_format = ImageFormat::jpeg;
     unsigned threads = 0;
     bool json = false, live = false, counted = false;  // counted: the number of frames was given
@@ -73,13 +75,13 @@ Result<void> write_image(const Options& options, std::filesystem::path path, con
 }
 
 // A frame's mesh; its texture beside, if it has one.
-Result<void> write_frame(const Options& options, const std::filesystem::path& path, const SynthFrame& frame,
+Result<void> write_frame(const Options& options, const std::filesystem::path& path, const Mesh& mesh,
                          const std::optional<SynthTexture>& texture) {
-    if (!texture) return write_mesh(path, frame.mesh);
+    if (!texture) return write_mesh(path, mesh);
     MeshFileOptions named;
     named.texture = path.stem().string() + extension_of(options.texture_format);
     if (auto ok = write_image(options, path, texture->image); !ok) return ok;
-    return write_mesh(path, texture->mesh, named);
+    return write_mesh(path, mesh, named);
 }
 
 SkeletonTrack empty_track(double fps) {
@@ -105,6 +107,7 @@ Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, Skele
         std::vector<SynthFrame> made(static_cast<std::size_t>(count));
         std::vector<TrueFrame> known(made.size());
         std::vector<std::optional<SynthTexture>> textures(made.size());
+        std::vector<std::optional<DepthCapture>> captures(made.size());
         const Threads inner = threads.at_most(std::max(1u, threads.count / static_cast<unsigned>(count)));
         parallel_for(made.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
@@ -112,21 +115,24 @@ Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, Skele
                 made[i] = synth_frame(options.synth, number, inner);
                 if (options.is_textured)
                     textures[i] = synth_texture(options.synth, options.texture, made[i], number, inner);
+                if (options.has_cameras)
+                    captures[i] = capture_depth(options.synth, options.cameras, made[i], number, inner);
                 if (truth) known[i] = true_frame(options.synth, truth->marks(), number, inner);
             }
         });
         for (std::size_t i = 0; i < made.size(); ++i) {
             SynthFrame& frame = made[i];
             const auto path = frame_path(options, options.first_frame + done++);
-            if (auto ok = write_frame(options, path, frame, textures[i]); !ok) return tl::unexpected(ok.error());
+            const Mesh& shown = captures[i] ? captures[i]->mesh : textures[i] ? textures[i]->mesh : frame.mesh;
+            if (auto ok = write_frame(options, path, shown, textures[i]); !ok) return tl::unexpected(ok.error());
             written.names.insert(path.filename().string());
-            written.vertices += textures[i] ? textures[i]->mesh.positions.size() : frame.mesh.positions.size();
-            written.triangles += frame.mesh.triangles.size();
+            written.vertices += shown.positions.size();
+            written.triangles += shown.triangles.size();
             add_pose(noisy, std::move(frame.pose));
             add_pose(exact, std::move(frame.true_pose));
             if (truth)
                 if (auto ok = truth->add(path.filename().string(), std::move(frame), std::move(known[i]),
-                                         textures[i] ? &*textures[i] : nullptr);
+                                         textures[i] ? &*textures[i] : nullptr, captures[i] ? &*captures[i] : nullptr);
                     !ok)
                     return tl::unexpected(ok.error());
             progress.step();
@@ -157,23 +163,29 @@ void report(const Options& options, const Written& written) {
         options.folder, frames / std::max(written.seconds, 1e-9)));
     if (!options.json) return;
     const std::filesystem::path folder(options.folder);
-    const nlohmann::json summary = {{"folder", options.folder},
-                                    {"frames", options.frames},
-                                    {"first_frame", options.first_frame},
-                                    {"fps", options.synth.fps},
-                                    {"seed", options.synth.seed},
-                                    {"vertices", written.vertices},
-                                    {"triangles", written.triangles},
-                                    {"first_mesh", frame_path(options, options.first_frame).string()},
-                                    {"skeleton", (folder / "skeleton.json").string()},
-                                    {"true_skeleton", (folder / "skeleton_true.json").string()},
-                                    {"seconds", written.seconds}};
+    nlohmann::json summary = {{"folder", options.folder},
+                              {"frames", options.frames},
+                              {"first_frame", options.first_frame},
+                              {"fps", options.synth.fps},
+                              {"seed", options.synth.seed},
+                              {"vertices", written.vertices},
+                              {"triangles", written.triangles},
+                              {"first_mesh", frame_path(options, options.first_frame).string()},
+                              {"skeleton", (folder / "skeleton.json").string()},
+                              {"true_skeleton", (folder / "skeleton_true.json").string()},
+                              {"seconds", written.seconds}};
+    if (options.has_cameras) {
+        summary["cameras"] = options.cameras.cameras;
+        summary["sensor"] = sensor_name(options.cameras.sensor);
+        summary["camera_distance_mm"] = camera_distance(options.synth, options.cameras);
+    }
     fmt::print("{}\n", summary.dump(2));
 }
 
 Result<void> synthesise(const Options& options) {
     if (auto ok = check_synth_options(options.synth); !ok) return ok;
     if (auto ok = check_texture_options(options.texture); !ok) return ok;
+    if (auto ok = check_depth_cameras(options.cameras); !ok) return ok;
     const auto start = std::chrono::steady_clock::now();
     std::error_code error;
     std::filesystem::create_directories(options.folder, error);
@@ -181,7 +193,8 @@ Result<void> synthesise(const Options& options) {
     SkeletonTrack noisy = empty_track(options.synth.fps), exact = noisy;
     std::optional<TruthFiles> truth;
     if (!options.truth.empty()) {
-        auto made = TruthFiles::create(options.truth, options.synth, options.first_frame, options.marks);
+        auto made = TruthFiles::create(options.truth, options.synth, options.first_frame, options.marks,
+                                       options.has_cameras ? &options.cameras : nullptr);
         if (!made) return tl::unexpected(made.error());
         truth = std::move(*made);
     }
@@ -203,6 +216,7 @@ Result<void> synthesise(const Options& options) {
 // A frame each time that one is due. What cannot be made or written in time is left out, as a camera would.
 Result<void> synthesise_live(const Options& options) {
     if (auto ok = check_synth_options(options.synth); !ok) return ok;
+    if (auto ok = check_depth_cameras(options.cameras); !ok) return ok;
     watch_for_interruption();
     const ThreadPool pool(std::min(thread_count(options.threads), 64u));
     Progress progress("synth", 0);
@@ -219,7 +233,10 @@ Result<void> synthesise_live(const Options& options) {
             ++late;
             continue;
         }
-        const auto made = synth_frame(options.synth, options.first_frame + static_cast<int>(k), pool.threads());
+        const int number = options.first_frame + static_cast<int>(k);
+        auto made = synth_frame(options.synth, number, pool.threads());
+        if (options.has_cameras)
+            made.mesh = capture_depth(options.synth, options.cameras, made, number, pool.threads()).mesh;
         wait_until(due(k));
         if (interruption() != 0) break;
         const auto bytes =
@@ -279,7 +296,11 @@ void add_motion(CLI::App& command, Options& o) {
 
 void add_capturing(CLI::App& command, Options& o) {
     command.option_defaults()->group("How it is captured");
-    command.add_option("--vertices", o.synth.vertices, "Vertices per frame, within 3 %")->capture_default_str();
+    command
+        .add_option("--vertices", o.synth.vertices,
+                    "Vertices per frame, within 3 %; with --cameras in all sheets together, roughly, by their number\n"
+                    "of pixels (default: the sensor's own)")
+        ->capture_default_str();
     command
         .add_option("--seed", o.synth.seed,
                     "Seed of the noise and the sampling, and of the order of moves (the tour stays the same)")
@@ -321,6 +342,48 @@ void add_texture(CLI::App& command, Options& o) {
         ->needs(texture);
 }
 
+void add_cameras(CLI::App& command, Options& o) {
+    command.option_defaults()->group("As depth cameras see it");
+    auto* cameras =
+        command
+            .add_option("--cameras", o.cameras.cameras,
+                        "Capture the person with so many depth cameras, evenly spaced around, the first "
+                        "one in front: an open\nsheet of triangles from each, with holes, noise and specks; "
+                        "with --truth the whole body beside")
+            ->check(CLI::Range(1, 16))
+            ->option_text("N");
+    std::vector<Choice<DepthSensor>> sensors;
+    for (const DepthSensor sensor : depth_sensors) sensors.push_back({sensor_name(sensor), sensor});
+    add_choice(command, "--sensor", o.cameras.sensor, sensors,
+               "What they are: kinect, which stand still some metres away, or phone, held at an arm's\nlength before "
+               "head and shoulders")
+        ->default_str("kinect")
+        ->needs(cameras);
+    command
+        .add_option("--camera-distance", o.cameras.distance,
+                    "How far away they are, mm (default: kinect 2500, or 3000 where people walk about; phone 600)")
+        ->check(CLI::Range(300.0, 4000.0))
+        ->option_text("MM")
+        ->needs(cameras);
+    command
+        .add_option("--depth-noise", o.cameras.noise,
+                    "How much of the sensor's own noise, lost and flying pixels there is; 0: exact cameras")
+        ->check(CLI::Range(0.0, 4.0))
+        ->capture_default_str()
+        ->needs(cameras);
+}
+
+// What belongs to the whole surface, and not to what depth cameras make of it.
+std::string contradiction_with_cameras(const CLI::App& command) {
+    for (const auto& [option, why] :
+         {std::pair("--texture", "depth cameras deliver vertex colours"),
+          std::pair("--lattice", "depth cameras have a grid of pixels"),
+          std::pair("--surface-noise", "depth cameras have their sensor's noise: --depth-noise")})
+        if (command.count("--cameras") > 0 && command.count(option) > 0)
+            return std::string(option) + ": not with --cameras; " + why;
+    return {};
+}
+
 std::string contradiction_in(const Options& options) {
     if (options.live == !options.folder.empty())
         return "OUT_DIR: or --live: give one of them, a folder to write to or standard output";
@@ -347,6 +410,7 @@ void add_synth(CLI::App& app, Run& run) {
     add_places(*command, o);
     add_motion(*command, o);
     add_capturing(*command, o);
+    add_cameras(*command, o);
     add_texture(*command, o);
     command->option_defaults()->group("Options");
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same")
@@ -370,6 +434,7 @@ void add_synth(CLI::App& app, Run& run) {
                                {"--vertices"},
                                {"--motion"},
                                {"--people"},
+                               {"--cameras", "Capture it with so many depth cameras: open sheets with holes and noise"},
                                {"--texture", "Write images of so many pixels along a side, in place of vertex colours"},
                                {"--seed", "Another number makes other noise, and other moves"},
                                {"--truth", "Folder for what no real capture knows: htvm compare --truth reads it"},
@@ -378,7 +443,13 @@ void add_synth(CLI::App& app, Run& run) {
     command->callback([options, command, &run] {
         options->is_textured = command->count("--texture") > 0;
         options->counted = command->count("--frames") > 0;
+        options->has_cameras = command->count("--cameras") > 0;
+        if (options->has_cameras) {
+            options->cameras.vertices = command->count("--vertices") > 0 ? options->synth.vertices : 0;
+            options->synth.vertices = body_vertices(options->cameras);
+        }
         if (const auto why = contradiction_in(*options); !why.empty()) throw CLI::ValidationError(why);
+        if (const auto why = contradiction_with_cameras(*command); !why.empty()) throw CLI::ValidationError(why);
         run = [options] { return options->live ? synthesise_live(*options) : synthesise(*options); };
     });
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -35,11 +36,35 @@ nlohmann::ordered_json event_json(const LimbEvent& event) {
     return out;
 }
 
+nlohmann::ordered_json vector_json(const Eigen::Vector3d& v) {
+    const auto rounded = [](double value) { return std::round(1e5 * value) / 1e5; };
+    return {rounded(v.x()), rounded(v.y()), rounded(v.z())};
+}
+
+nlohmann::ordered_json cameras_json(const DepthCameraOptions& options,
+                                    const std::vector<std::vector<DepthCamera>>& places) {
+    nlohmann::ordered_json out = {{"sensor", sensor_name(options.sensor)}};
+    auto& frames = out["frames"] = nlohmann::ordered_json::array();
+    for (const auto& cameras : places) {
+        auto& frame = frames.emplace_back(nlohmann::ordered_json::array());
+        for (const DepthCamera& camera : cameras)
+            frame.push_back({{"width", camera.width},
+                             {"height", camera.height},
+                             {"focal", camera.focal},
+                             {"position", vector_json(camera.position)},
+                             {"right", vector_json(camera.right)},
+                             {"up", vector_json(camera.up)},
+                             {"backward", vector_json(camera.backward)}});
+    }
+    return out;
+}
+
 }  // namespace
 
 Result<TruthFiles> TruthFiles::create(const std::filesystem::path& folder, const SynthOptions& options, int first_frame,
-                                      int marks) {
-    for (const char* name : {"surface", "marks"}) {
+                                      int marks, const DepthCameraOptions* cameras) {
+    for (const char* name : {"surface", "marks", "seen"}) {
+        if (!cameras && std::string_view(name) == "seen") continue;
         std::error_code error;
         std::filesystem::create_directories(folder / name, error);
         if (error) return fail(ErrorKind::bad_input, (folder / name).string() + " cannot be made: " + error.message());
@@ -48,12 +73,13 @@ Result<TruthFiles> TruthFiles::create(const std::filesystem::path& folder, const
     files.folder_ = folder;
     files.options_ = options;
     files.first_frame_ = first_frame;
+    if (cameras) files.cameras_ = *cameras;
     files.marks_ = surface_marks(options, static_cast<std::size_t>(marks));
     return files;
 }
 
 Result<void> TruthFiles::add(const std::string& file_name, SynthFrame frame, TrueFrame truth,
-                             const SynthTexture* texture) {
+                             const SynthTexture* texture, const DepthCapture* capture) {
     if (texture) {
         const auto path = folder_ / "texture" / std::filesystem::path(file_name).replace_extension(".png");
         std::error_code error;
@@ -64,6 +90,10 @@ Result<void> TruthFiles::add(const std::string& file_name, SynthFrame frame, Tru
         if (!bytes) return tl::unexpected(bytes.error());
         if (auto ok = write_file(path, *bytes); !ok) return ok;
         textures_.push_back({texture->layout, texture->gain});
+    }
+    if (capture) {
+        if (auto ok = write_mesh(folder_ / "seen" / file_name, seen_surface(frame, *capture)); !ok) return ok;
+        camera_places_.push_back(capture->cameras);
     }
     Mesh surface = std::move(frame.mesh);
     surface.positions = std::move(frame.true_positions);
@@ -89,6 +119,7 @@ Result<void> TruthFiles::finish() const {
             {{"layout", layout},
              {"gain",
               {std::round(1e4 * gain[0]) / 1e4, std::round(1e4 * gain[1]) / 1e4, std::round(1e4 * gain[2]) / 1e4}}});
+    if (cameras_) out["cameras"] = cameras_json(*cameras_, camera_places_);
     return write_file(folder_ / "truth.json", out.dump(1) + "\n");
 }
 

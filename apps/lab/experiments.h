@@ -38,6 +38,7 @@ struct ExperimentPlan {
     double picture_colour_step = 6;                       // figures 16 to 19
     std::vector<double> noise_powers{0, 20, 40, 60, 80};  // mm^2; figure 20
     std::vector<double> noise_qualities{10, 30, 50, 70};
+    int camera_frames = 100;                 // figure 20 of one depth camera's capture: as many as the paper's
     std::uint64_t surface_samples = 100000;  // for M2, per direction
     std::size_t most_measured = 15;          // number of frames on which M1 and M2 are measured, evenly spread,
                                              // beginning with the first

@@ -308,11 +308,11 @@ Figure figure_16(const Findings& findings, const ExperimentPlan& plan, Easel& ea
     return figure;
 }
 
-std::optional<NoiseEffect> noise_effect(const Findings& findings) {
-    if (findings.noise.size() < 2) return std::nullopt;
-    const auto &clean = findings.noise.front().second, &worst = findings.noise.back().second;
+std::optional<NoiseEffect> noise_effect(std::span<const std::pair<double, std::vector<RdPoint>>> noise) {
+    if (noise.size() < 2) return std::nullopt;
+    const auto &clean = noise.front().second, &worst = noise.back().second;
     NoiseEffect out;
-    out.highest_power = findings.noise.back().first;
+    out.highest_power = noise.back().first;
     const auto& m1 = measure_of("m1_mm");
     out.rate_difference = bjontegaard_rate_difference(rate_curve(clean, "paper", m1), rate_curve(worst, "paper", m1));
     for (std::size_t i = 0; i < std::min(clean.size(), worst.size()); ++i) {
@@ -323,37 +323,33 @@ std::optional<NoiseEffect> noise_effect(const Findings& findings) {
     return out;
 }
 
-Figure figure_20(const Findings& findings, Easel& easel) {
-    Figure figure{"20",
-                  "geometry error (M1) against bit rate, for skeletons of less and less quality",
-                  "Noise of 20, 40, 60 and 80 mm² on each joint coordinate costs bits but not quality: points of the "
-                  "same settings lie at almost the same error.",
-                  {},
-                  findings.true_skeleton
-                      ? "White Gaussian noise of the given power on each coordinate of the true skeleton's joints, "
-                        "geometry alone, the paper's coder."
-                      : "White Gaussian noise of the given power added to the tracked skeleton, which has an error of "
-                        "its own; geometry alone, the paper's coder."};
-    if (findings.noise.empty()) {
-        figure.skipped = "the capture has no skeleton to add noise to.";
-        return figure;
-    }
+namespace {
+
+constexpr const char* noise_finding =
+    "Noise of 20, 40, 60 and 80 mm² on each joint coordinate costs bits but not quality: points of the same settings "
+    "lie at almost the same error.";
+constexpr const char* noise_on_the_truth =
+    "White Gaussian noise of the given power on each coordinate of the true skeleton's joints, geometry alone, the "
+    "paper's coder.";
+
+void add_noise_chart(Figure& figure, std::span<const std::pair<double, std::vector<RdPoint>>> noise,
+                     const std::string& name, Easel& easel) {
     Chart chart;
     chart.title = "Noise on the skeleton, M1";
     chart.x_label = rate_label;
     chart.y_label = "M1, vertex to vertex, RMS, mm";
     const char* colours[] = {"#0072b2", "#56b4e9", "#009e73", "#e69f00", "#d55e00"};
     const int marks[] = {7, 5, 9, 13, 11};
-    for (std::size_t i = 0; i < findings.noise.size(); ++i) {
-        auto line = line_of(findings.noise[i].second, "paper", "m1_mm");
-        line.title = fmt::format("{:g} mm²", findings.noise[i].first);
+    for (std::size_t i = 0; i < noise.size(); ++i) {
+        auto line = line_of(noise[i].second, "paper", "m1_mm");
+        line.title = fmt::format("{:g} mm²", noise[i].first);
         line.colour = colours[i % 5];
         line.mark = marks[i % 5];
         chart.lines.push_back(std::move(line));
     }
     fit_axes(chart, true);
-    figure.charts.push_back(draw(easel, "figure_20", chart));
-    if (const auto effect = noise_effect(findings)) {
+    figure.charts.push_back(draw(easel, name, chart));
+    if (const auto effect = noise_effect(noise)) {
         figure.found = fmt::format(
             "{} at {:g} mm² than with no added noise at equal error, and M1 at the same steps differs by {:.1f} % at "
             "most.",
@@ -363,6 +359,35 @@ Figure figure_20(const Findings& findings, Easel& easel) {
         figure.found +=
             robust ? " So it is here: errors stay, the rate pays." : " Errors change more than in the paper.";
     }
+}
+
+}  // namespace
+
+Figure figure_20(const Findings& findings, Easel& easel) {
+    Figure figure{"20",
+                  "geometry error (M1) against bit rate, for skeletons of less and less quality",
+                  noise_finding,
+                  {},
+                  findings.true_skeleton
+                      ? noise_on_the_truth
+                      : "White Gaussian noise of the given power added to the tracked skeleton, which has an error of "
+                        "its own; geometry alone, the paper's coder."};
+    if (findings.noise.empty())
+        figure.skipped = "the capture has no skeleton to add noise to.";
+    else
+        add_noise_chart(figure, findings.noise, "figure_20", easel);
+    return figure;
+}
+
+Figure figure_20_of_one_camera(const Findings& findings, Easel& easel) {
+    Figure figure{"20b",
+                  "the same of what one depth camera sees, as in the paper's \"Alex\"",
+                  noise_finding,
+                  {},
+                  fmt::format("Not this capture, but a synthetic one as the paper's is: {}, pixels joined where their "
+                              "depths differ little. {}",
+                              findings.camera_capture, noise_on_the_truth)};
+    add_noise_chart(figure, findings.camera_noise, "figure_20b", easel);
     return figure;
 }
 
@@ -630,9 +655,12 @@ std::vector<Claim> claims(const Findings& findings) {
         out.push_back(contest_claim("Ahead of TFAN in M3 at low rates", "below 16 to 20 bpvf", 16,
                                     contest(findings.pictures, "paper", "tfan", "m3_foreground_db")));
     if (auto claim = motion_claim(findings)) out.push_back(std::move(*claim));
-    if (const auto effect = noise_effect(findings)) {
+    for (const bool of_camera : {false, true}) {
+        const auto effect = noise_effect(of_camera ? findings.camera_noise : findings.noise);
+        if (!effect) continue;
         Claim claim{
-            "Noise on the skeleton costs bits, not quality", "points at almost the same error",
+            of_camera ? "The same of one depth camera's capture" : "Noise on the skeleton costs bits, not quality",
+            "points at almost the same error",
             fmt::format("at {:g} mm²: {}, error within {:.1f} %", effect->highest_power,
                         effect->rate_difference ? bits_phrase(*effect->rate_difference) : "rates not comparable",
                         100 * effect->largest_error_change),

@@ -39,6 +39,7 @@ Figure figure_16(const Findings& findings, const ExperimentPlan& plan, Easel& ea
 Figure figure_17(const Findings& findings, Easel& easel);
 Figure figure_18(const Findings& findings, Easel& easel);
 Figure figure_20(const Findings& findings, Easel& easel);
+Figure figure_20_of_one_camera(const Findings& findings, Easel& easel);
 Figure figure_21(const InternalRun& run, Easel& easel);
 Figure figure_22(const InternalRun& run, Easel& easel);
 Figure figure_23(const InternalRun& run, Easel& easel);
@@ -52,7 +53,7 @@ struct NoiseEffect {
     std::optional<double> rate_difference;
     double largest_error_change = 0;
 };
-std::optional<NoiseEffect> noise_effect(const Findings& findings);
+std::optional<NoiseEffect> noise_effect(std::span<const std::pair<double, std::vector<RdPoint>>> noise);
 
 // Where the bits go at the rate at which the paper's coder and TFAN cross (or in the middle of their rates), as an
 // explanation.

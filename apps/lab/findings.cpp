@@ -286,6 +286,12 @@ nlohmann::json facts_json(const FactList& facts) {
     return out;
 }
 
+nlohmann::json noise_json(const std::vector<std::pair<double, std::vector<RdPoint>>>& noise) {
+    auto out = nlohmann::json::array();
+    for (const auto& [power, points] : noise) out.push_back({{"power_mm2", power}, {"points", points_json(points)}});
+    return out;
+}
+
 }  // namespace
 
 std::vector<std::string> summary_paragraphs(const std::string& what, const Findings& findings,
@@ -360,9 +366,6 @@ nlohmann::json report_json(const Report& report, const Findings& findings) {
                           {"here", claim.here},
                           {"verdict", claim.verdict},
                           {"holds", claim.holds}});
-    auto noise = nlohmann::json::array();
-    for (const auto& [power, points] : findings.noise)
-        noise.push_back({{"power_mm2", power}, {"points", points_json(points)}});
     nlohmann::json out = {{"title", report.title},
                           {"summary", report.summary},
                           {"capture", facts_json(report.capture)},
@@ -378,7 +381,8 @@ nlohmann::json report_json(const Report& report, const Findings& findings) {
                           {"seams", seams_json(findings.seams)},
                           {"colour", points_json(findings.colour)},
                           {"pictures", points_json(findings.pictures)},
-                          {"noise", std::move(noise)},
+                          {"noise", noise_json(findings.noise)},
+                          {"camera_noise", noise_json(findings.camera_noise)},
                           {"rate_differences",
                            {{"draco10", rate_differences_json(findings.geometry, "draco10")},
                             {"tfan", rate_differences_json(findings.geometry, "tfan")},

@@ -27,6 +27,8 @@ struct Findings {
     std::vector<RdPoint> colour;                          // 11 to 13
     std::vector<RdPoint> pictures;                        // 16
     std::vector<std::pair<double, std::vector<RdPoint>>> noise;          // 20: power, and its points
+    std::vector<std::pair<double, std::vector<RdPoint>>> camera_noise;   // 20: likewise, of one depth camera's capture
+    std::string camera_capture;                                          // what that is, in words
     std::optional<InternalRun> internals;                                // 21 to 25
     std::size_t geometry_every = 1, colour_every = 1, motion_every = 1;  // every n-th frame was measured
     bool true_skeleton = false;                                          // whether the noise was added to the true

@@ -16,6 +16,7 @@
 #include "findings.h"
 #include "galleries.h"
 #include "io/sequence.h"
+#include "one_camera_capture.h"
 #include "page.h"
 #include "sweep.h"
 
@@ -60,6 +61,7 @@ ExperimentPlan plan_of(const Options& options) {
         plan.thresholds = 3;
         plan.intervals = {1, 3, 10};
         plan.interval_qualities = {60};
+        plan.camera_frames = 10;
     }
     return plan;
 }
@@ -193,6 +195,45 @@ Result<void> measure_choices(const Options& options, const Laboratory& laborator
                         sweep_options(laboratory, plan, findings.motion_every, true, true));
 }
 
+// Figure 20 on one capture, for each power of the noise on its skeleton.
+Result<void> measure_noise_into(std::vector<std::pair<double, std::vector<RdPoint>>>& noise, const std::string& name,
+                                const Laboratory& laboratory, const ExperimentPlan& plan,
+                                const std::vector<Pose>& poses) {
+    const auto measuring =
+        sweep_options(laboratory, plan, measure_every(laboratory.source->size(), plan.most_measured), false, false);
+    for (const double power : plan.noise_powers) {
+        noise.emplace_back(power, std::vector<RdPoint>{});
+        if (auto ok = measure_into(noise.back().second, laboratory, fmt::format("{}: noise of {:g} mm^2", name, power),
+                                   noise_trials(plan, poses, power), measuring);
+            !ok)
+            return ok;
+    }
+    return {};
+}
+
+// Figure 20 on the capture and, as the paper's is about one depth camera's, on a synthetic one of that kind.
+Result<void> measure_noise(const Options& options, const Laboratory& laboratory, const ExperimentPlan& plan,
+                           Findings& findings) {
+    const auto poses = poses_for_noise(options, *laboratory.source);
+    if (!poses) return tl::unexpected(poses.error());
+    findings.true_skeleton = !true_skeleton_file(options).empty();
+    if (!poses->empty())
+        if (auto ok = measure_noise_into(findings.noise, "figure 20", laboratory, plan, *poses); !ok) return ok;
+    SourceOptions source_options;
+    source_options.memory_bytes = options.memory_megabytes << 20;
+    source_options.spill_folder = laboratory.work_folder / "one_camera";
+    if (auto made = make_folder(source_options.spill_folder); !made) return made;
+    const ThreadPool pool(laboratory.threads);
+    const auto capture = one_camera_capture(plan.camera_frames, source_options, pool.threads());
+    if (!capture) return tl::unexpected(capture.error());
+    Laboratory before_the_camera = laboratory;
+    before_the_camera.source = &capture->source;
+    before_the_camera.common_key = fmt::format("{}; {}", fingerprint({}), capture->key);
+    findings.camera_capture = capture->key;
+    return measure_noise_into(findings.camera_noise, "figure 20, one camera", before_the_camera, plan,
+                              capture->true_poses);
+}
+
 Result<void> measure_curves(const Options& options, const Laboratory& laboratory, const ExperimentPlan& plan,
                             const std::set<int>& wanted, Findings& findings) {
     const auto frames = laboratory.source->size();
@@ -218,19 +259,7 @@ Result<void> measure_curves(const Options& options, const Laboratory& laboratory
                 run(findings.pictures, "figure 16: pictures", picture_trials(plan), plan.picture_every, false, true);
             !ok)
             return ok;
-    if (!wanted.contains(20)) return {};
-    const auto poses = poses_for_noise(options, *laboratory.source);
-    if (!poses) return tl::unexpected(poses.error());
-    findings.true_skeleton = !true_skeleton_file(options).empty();
-    for (const double power : plan.noise_powers) {
-        if (poses->empty()) break;
-        findings.noise.emplace_back(power, std::vector<RdPoint>{});
-        if (auto ok = run(findings.noise.back().second, fmt::format("figure 20: noise of {:g} mm^2", power).c_str(),
-                          noise_trials(plan, *poses, power), findings.geometry_every);
-            !ok)
-            return ok;
-    }
-    return {};
+    return wanted.contains(20) ? measure_noise(options, laboratory, plan, findings) : Result<void>();
 }
 
 Result<void> measure_internals(const Options& options, const Laboratory& laboratory, const std::set<int>& wanted,
@@ -279,7 +308,10 @@ std::vector<Figure> chart_figures(const Findings& findings, const ExperimentPlan
     if (wanted.contains(12)) out.push_back(figure_12(findings, plan, easel));
     if (wanted.contains(13)) out.push_back(figure_13(findings, plan, easel));
     if (wanted.contains(16)) out.push_back(figure_16(findings, plan, easel));
-    if (wanted.contains(20)) out.push_back(figure_20(findings, easel));
+    if (wanted.contains(20)) {
+        out.push_back(figure_20(findings, easel));
+        out.push_back(figure_20_of_one_camera(findings, easel));
+    }
     if (wanted.contains(17)) out.push_back(figure_17(findings, easel));
     if (wanted.contains(18)) out.push_back(figure_18(findings, easel));
     auto histograms = histogram_figures(findings, wanted, easel);

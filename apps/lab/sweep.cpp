@@ -112,6 +112,17 @@ Result<SourceFrames> SourceFrames::load(Capture& capture, const SourceOptions& o
     return out;
 }
 
+Result<SourceFrames> SourceFrames::of(std::vector<SourceFrame> frames, SequenceFacts facts,
+                                      const SourceOptions& options) {
+    if (frames.empty()) return fail(ErrorKind::bad_input, "there is no mesh to measure");
+    SourceFrames out;
+    out.facts_ = std::move(facts);
+    for (SourceFrame& frame : frames)
+        if (auto kept = out.keep(std::move(frame), options); !kept) return tl::unexpected(kept.error());
+    out.facts_.frame_side /= static_cast<double>(out.frames_.size());
+    return out;
+}
+
 Result<std::shared_ptr<const SourceFrame>> SourceFrames::frame(std::size_t index) const {
     if (files_[index].empty()) return frames_[index];
     auto mesh = read_mesh(files_[index]);

@@ -49,6 +49,8 @@ public:
     // Reads the whole capture, in mm, without normals and texture coordinates, which no coder is measured by; textures
     // are kept for pictures.
     static Result<SourceFrames> load(app::Capture& capture, const SourceOptions& options);
+    // Frames that were made; facts: all but what follows from the meshes.
+    static Result<SourceFrames> of(std::vector<SourceFrame> frames, SequenceFacts facts, const SourceOptions& options);
     std::size_t size() const { return frames_.size(); }
     const SequenceFacts& facts() const { return facts_; }
     // Thread-safe.

@@ -39,22 +39,22 @@ expect 0 "M1 geometry" "$htvm" compare capture shown --unit mm --views 0
 expect 0 "worst region there, RMS mm" "$htvm" compare capture shown --unit mm --only coverage
 "$htvm" compare capture shown --unit mm --only coverage --json --quiet >open.json
 of() { field open.json sequence coverage "$@"; }
-is "captured, covered" "$(of captured covered)" 0.84            # (305 + 300 + 205) of (400 + 300 + 300) mm, without some beside the border
-is "captured, least" "$(of captured least_covered)" 0.69        # 205 of 300 mm in the last frame
-is "captured, absent" "$(of captured absent)" 0.16
+is "captured, covered" "$(of captured covered)" 0.81            # 305, 300 and 205 mm of 400, 300 and 300
+is "captured, least" "$(of captured least_covered)" 0.68        # the last frame's
+is "captured, absent" "$(of captured absent)" 0.19
 is "M2 over what is covered" "$(of m2 rms_mm)" 1.00
 is "its largest distance" "$(of m2 forward largest_mm)" 1.00
 is "the worst region there" "$(of worst_region all p99_mm)" 1.00
-is "what of the capture changes" "$(of captured changed)" 0.45  # 95 of 300 mm vanish, then 95 appear and 90 vanish of 300
+is "what of the capture changes" "$(of captured changed)" 0.47  # 95 mm vanish, then 95 appear and 90 vanish, of 300 and 300
 is "what is shown that changes" "$(of shown changed)" 0.00
 is "the first frame's change" "$(field open.json frames 0 coverage captured changed)" none
 is "the second frame's" "$(field open.json frames 1 coverage captured vanished)" 0.32
 is "its cover by the one before" "$(field open.json frames 1 coverage captured covered_by_frame_before)" 1.00
 is "M2 beside it" "$(field open.json sequence m2)" none
 # A wider distance covers more, and asks for it.
-"$htvm" compare capture shown --unit mm --only m2 --covered-within 50 --json --quiet >wide.json
-is "the distance" "$(field wide.json sequence coverage within_mm)" 50.00
-is "what is within it" "$(field wide.json frames 0 coverage captured covered)" 0.87
+"$htvm" compare capture shown --unit mm --only m2 --covered-within 40 --json --quiet >wide.json
+is "the distance" "$(field wide.json sequence coverage within_mm)" 40.00
+is "what is within it" "$(field wide.json frames 0 coverage captured covered)" 0.85
 # Beside it M2 counts what lies beyond the border, and it is said that there is another way.
 is "M2" "$(python3 -c 'import json; print(json.load(open("wide.json"))["sequence"]["m2"]["rms_mm"] > 15)')" True
 expect 0 "the capture is open: what lies beside its borders counts as an error" "$htvm" compare capture shown --unit mm --only m2
@@ -76,13 +76,13 @@ cmp -s without.json with.json || fail "vertices that are not shown are measured:
 
 "$htvm" compare capture capture --unit mm --only coverage --truth whole --json --quiet >same.json
 truth() { field "$1" sequence coverage truth "$2"; }
-is "what the capture covers of the truth" "$(truth same.json captured)" 0.84
+is "what the capture covers of the truth" "$(truth same.json captured)" 0.85  # 400, 305 and 310 of 400 mm
 is "what is filled" "$(truth same.json filled)" 0.00
 mkdir filled
 for frame in 0 1 2; do sheet filled/$frame.obj 0 400 1; done
 "$htvm" compare capture filled --unit mm --only coverage --truth whole --json --quiet >filled.json
 is "what is shown covers of the truth" "$(truth filled.json shown)" 1.00
-is "the holes filled" "$(truth filled.json filled)" 0.16
+is "the holes filled" "$(truth filled.json filled)" 0.15
 is "the capture's distance" "$(truth filled.json captured_rms_mm)" 0.00
 is "the shown one's where it is seen" "$(truth filled.json shown_rms_mm)" 1.00
 expect 0 "holes of the capture, filled" "$htvm" compare capture filled --unit mm --only coverage --truth whole

@@ -30,4 +30,25 @@ expect 2 "--motion" "$htvm" synth two --motion sleep
 expect 2 "give --live" "$htvm" synth - --frames 1
 expect 0 "no texture coordinates to compare" "$htvm" compare dance dance.htvm --only texcoords
 
+# Depth cameras: the same options give the same bytes, and a frame on its own is that of the sequence.
+cameras="--cameras 2 --motion calm --vertices 3000 --quiet"
+"$htvm" synth sheets $cameras --frames 3 --truth sheets_truth --truth-marks 20
+"$htvm" synth again $cameras --frames 3
+diff -r sheets again || fail "captures by the same depth cameras differ"
+"$htvm" synth last $cameras --first-frame 2 --frames 1
+cmp -s sheets/frame_00002.ply last/frame_00002.ply || fail "a frame of depth cameras on its own is another one"
+[ "$(ls sheets_truth/seen | grep -c 'frame_0000[0-2].ply')" = 3 ] || fail "a frame of what cameras could see is missing"
+grep -q '"sensor": "kinect"' sheets_truth/truth.json || fail "truth.json does not name the cameras"
+[ ! -e truth/seen ] || fail "without cameras there is something that they see"
+"$htvm" synth --live --cameras 1 --vertices 1000 --frames 1 --quiet >one.ply
+head -c 3 one.ply | grep -q ply || fail "depth cameras do not go live"
+expect 0 '"sensor": "phone"' "$htvm" synth selfie --cameras 1 --sensor phone --vertices 1500 --frames 1 --json
+expect 2 "--texture: not with --cameras; depth cameras deliver vertex colours" "$htvm" synth two --cameras 2 --texture 128
+expect 2 "--lattice: not with --cameras" "$htvm" synth two --cameras 2 --lattice
+expect 2 "--surface-noise: not with --cameras; depth cameras have their sensor's noise: --depth-noise" \
+    "$htvm" synth two --cameras 2 --surface-noise 1
+expect 2 "--sensor requires --cameras" "$htvm" synth two --sensor phone
+expect 2 "--cameras" "$htvm" synth two --cameras 17
+expect 1 "a phone can be 300 to 1200 mm away" "$htvm" synth two --cameras 1 --sensor phone --camera-distance 2000 --frames 1
+
 done_with "synthetic captures tell the truth"

@@ -41,9 +41,9 @@ PresenceHistory first_history(const TrackedPlace& tracked) {
 }
 
 // Keeps what has just vanished within what is shown: a hole whose rim is all shown, and which nothing else was missing
-// from. At the border of all that is known there is no telling.
-void fill_new_holes(const TrackedPlace& tracked, const PresenceHistory& before, const PresenceOptions& options,
-                    PresenceHistory& now) {
+// from, nor is seen elsewhere. At the border of all that is known there is no telling.
+void fill_new_holes(std::span<const std::uint8_t> seen, const TrackedPlace& tracked, const PresenceHistory& before,
+                    const PresenceOptions& options, PresenceHistory& now) {
     const std::size_t vertices = now.shown.size();
     const auto from_border = edges_from_border(points_of(tracked.positions), tracked.triangles);
     DisjointSets holes(vertices);
@@ -53,7 +53,7 @@ void fill_new_holes(const TrackedPlace& tracked, const PresenceHistory& before, 
                 if (now.shown[u] == 0) holes.join(v, u);
     std::vector<std::uint8_t> stays(vertices, 0);
     for (std::uint32_t v = 0; v < vertices; ++v) {
-        const bool known = before.shown[v] != 0 && now.unseen[v] <= options.hold;
+        const bool known = before.shown[v] != 0 && seen[v] == 0 && now.unseen[v] <= options.hold;
         if (now.shown[v] == 0 && (!known || from_border[v] == 0)) stays[holes.of(v)] = 1;
     }
     for (std::uint32_t v = 0; v < vertices; ++v)
@@ -77,18 +77,20 @@ void hide_specks(const TrackedPlace& tracked, const PresenceOptions& options, Pr
 
 PresenceHistory judge_presence(std::span<const std::uint8_t> seen, const TrackedPlace& tracked,
                                const PresenceHistory& before, const PresenceOptions& options) {
-    constexpr float gain = 0.6F, comes_from = 0.5F, goes_below = 0.25F;
+    constexpr float gain = 0.6F, comes_from = 0.45F, goes_below = 0.3F;
     constexpr auto most_unseen = std::numeric_limits<std::uint16_t>::max();
     const auto was = before.score.empty() ? first_history(tracked) : before;
     const auto share = seen_around(seen, tracked.around);
     PresenceHistory out = was;
     for (std::size_t v = 0; v < seen.size(); ++v) {
-        out.score[v] += gain * (share[v] - out.score[v]);
+        // Half by itself, so that a rim that has curled away goes though all around it is seen.
+        const float now = (share[v] + (seen[v] == 1 ? 1.0F : 0.0F)) / 2;
+        out.score[v] += gain * (now - out.score[v]);
         out.unseen[v] =
             seen[v] == 1 ? std::uint16_t{0} : static_cast<std::uint16_t>(std::min<int>(was.unseen[v] + 1, most_unseen));
         out.shown[v] = out.score[v] > (was.shown[v] != 0 ? goes_below : comes_from) ? 1 : 0;
     }
-    if (options.fill) fill_new_holes(tracked, was, options, out);
+    if (options.fill) fill_new_holes(seen, tracked, was, options, out);
     if (options.leave_out_specks) hide_specks(tracked, options, out.shown);
     return out;
 }
