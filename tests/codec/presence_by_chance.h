@@ -133,8 +133,10 @@ public:
     }
     // Another hole; or the borders of what the reference has, moved.
     Presence any_change() {
-        if (below(random_, 2) == 0) return presence_by_chance(Removal::region, by_nodes().mesh.positions, random_);
-        return changed_by_chance(last_presence(false), by_nodes().around, random_);
+        const auto presence = last_presence(false);
+        if (!anything_absent(presence) || below(random_, 2) == 0)
+            return presence_by_chance(Removal::region, by_nodes().mesh.positions, random_);
+        return changed_by_chance(presence, by_nodes().around, random_);
     }
     const std::vector<Packet>& packets() const { return out_.packets; }
 
