@@ -554,12 +554,12 @@ std::vector<std::int64_t> times_of(const MeshSource& source, const MeshSource& o
     return out;
 }
 
-// The positions of the frames to compare: of files by the numbers in their names, of a stream by time; in order where
-// that pairs none, or fewer than there are though both sides have as many.
+// The positions of the frames to compare: of files by time or the numbers in their names, of a stream by time; in order
+// where that pairs none, or fewer than there are though both sides have as many.
 std::vector<FramePair> pairs_of(const Sources& sources) {
     const auto& [original, decoded] = sources;
     const bool of_files = !original.is_stream && !decoded.is_stream;
-    auto pairs = of_files ? pair_by_number(original.numbers, decoded.numbers)
+    auto pairs = of_files ? pair_files(original, decoded)
                           : pair_by_time(times_of(original, decoded), times_of(decoded, original));
     const bool alike = !of_files && original.frames == decoded.frames && pairs.size() < original.frames;
     if (!pairs.empty() && !alike) return pairs;
@@ -585,6 +585,12 @@ void warn_of_frames_left_out(const Sources& sources, const std::vector<FramePair
     };
     tell(sources.original, sources.decoded, of_original);
     tell(sources.decoded, sources.original, of_decoded);
+    if (may_be_out_of_step(sources.original, sources.decoded))
+        warn(
+            fmt::format("{} has fewer frames than {}, and they are paired by number: where frames were left out while "
+                        "encoding, those behind are compared with others; compare the stream itself, or PLY files, "
+                        "which tell their times",
+                        sources.decoded.name, sources.original.name));
 }
 
 // The box around all originals, for cameras that stand still.
@@ -952,8 +958,8 @@ void add_results(CLI::App& command, Options& o) {
 }
 
 constexpr const char* what_is_measured =
-    "Measure decoded meshes against their originals, frame by frame: by the numbers in their names, or in\n"
-    "the order of their names if they have none:\n"
+    "Measure decoded meshes against their originals, frame by frame: by the times that streams and PLY files\n"
+    "tell, else by the numbers in their names, or in the order of their names if they have none:\n"
     "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
     "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
     "  regions  the worst region of the surface, a ball of 10 cm: RMS distance there, in the worse direction; of\n"
