@@ -39,11 +39,11 @@ expect 0 "mesh 2 of standard input: it has no colours" bash -c "cat fading/*.ply
 
 # The second half is in another unit.
 change mixed 'v = [[c / 1000 for c in row[:3]] + row[3:] for row in v] if k > 2 else v'
-expect 1 "frame_00003.ply: it is 1000 times smaller than the other frames: it is of another capture, or in another unit" \
+expect 1 "frame_00003.ply: it is 1010 times smaller than the other frames: it is of another capture, or in another unit" \
     "$htvm" encode mixed -o x.htvm
 # A frame in inches among centimetres is told, and encoded.
 change inches 'v = [[c / 25.4 if k == 3 else c / 10 for c in row[:3]] + row[3:] for row in v]'
-expect 0 "warning: inches/frame_00003.ply: it is 2.5 times smaller than the other frames, in its extent and its edges alike" \
+expect 0 "warning: inches/frame_00003.ply: it is 2.6 times smaller than the other frames, in its extent and its edges alike" \
     "$htvm" encode inches -o x.htvm
 "$htvm" encode capture -o x.htvm 2>&1 | grep "times" && fail "people who walk are of another size"
 
@@ -108,7 +108,7 @@ expect 0 "htvm check --help-all' explains the words" "$htvm" check capture
 
 # Frames that are odd among the others, though encode takes them, are named; people who walk are not.
 "$htvm" check capture | grep -q "  odd" && fail "people who walk are odd: $("$htvm" check capture)"
-expect 0 "odd          inches/frame_00003.ply: it is 2.5 times smaller than the other frames" "$htvm" check inches
+expect 0 "odd          inches/frame_00003.ply: it is 2.6 times smaller than the other frames" "$htvm" check inches
 expect 0 "1 frame is not like the others, as said above" "$htvm" check inches
 change dark 'v = [row[:3] + [0, 0, 0] for row in v] if k == 1 else v'
 expect 0 "odd          dark/frame_00001.ply: it is black: its brightness is 0 of 255" "$htvm" check dark

@@ -75,7 +75,7 @@ MeshSource files(std::size_t frames, std::vector<std::int64_t> times_us = {}) {
     return out;
 }
 
-Pairs pairs_of(const MeshSource& original, const MeshSource& decoded) {
+Pairs pairs_of_files(const MeshSource& original, const MeshSource& decoded) {
     Pairs out;
     for (const auto& pair : pair_files(original, decoded)) out.emplace_back(pair.original, pair.decoded);
     return out;
@@ -83,19 +83,20 @@ Pairs pairs_of(const MeshSource& original, const MeshSource& decoded) {
 
 TEST(FramePairs, OfFilesGoByTheTimesThatBothTell) {
     const auto original = files(4, {0, 40000, 90000, 120000});
-    EXPECT_EQ(pairs_of(original, files(3, {0, 90000, 120000})), (Pairs{{0, 0}, {2, 1}, {3, 2}}));
-    EXPECT_EQ(pairs_of(original, files(3)), (Pairs{{0, 0}, {1, 1}, {2, 2}})) << "by number where one tells none";
-    EXPECT_EQ(pairs_of(original, files(3, {5, 33333, 66667})), (Pairs{{0, 0}, {1, 1}, {2, 2}})) << "another clock";
+    EXPECT_EQ(pairs_of_files(original, files(3, {0, 90000, 120000})), (Pairs{{0, 0}, {2, 1}, {3, 2}}));
+    EXPECT_EQ(pairs_of_files(original, files(3)), (Pairs{{0, 0}, {1, 1}, {2, 2}})) << "by number where one tells none";
+    EXPECT_EQ(pairs_of_files(original, files(3, {5, 33333, 66667})), (Pairs{{0, 0}, {1, 1}, {2, 2}}))
+        << "another clock";
 }
 
 TEST(FramePairs, OfFilesWithoutTimesGoByTheRateOfTheDecodedOnes) {
-    EXPECT_EQ(pairs_of(files(6), files(4, {0, 33333, 100000, 166667})), (Pairs{{0, 0}, {1, 1}, {3, 2}, {5, 3}}));
-    EXPECT_EQ(pairs_of(files(6), files(3, {66667, 100000, 133333})), (Pairs{{2, 0}, {3, 1}, {4, 2}}))
+    EXPECT_EQ(pairs_of_files(files(6), files(4, {0, 33333, 100000, 166667})), (Pairs{{0, 0}, {1, 1}, {3, 2}, {5, 3}}));
+    EXPECT_EQ(pairs_of_files(files(6), files(3, {66667, 100000, 133333})), (Pairs{{2, 0}, {3, 1}, {4, 2}}))
         << "the first two are left out";
-    EXPECT_EQ(pairs_of(files(6), files(3, {0, 33333, 90000})), (Pairs{{0, 0}, {1, 1}, {2, 2}})) << "not regular";
+    EXPECT_EQ(pairs_of_files(files(6), files(3, {0, 33333, 90000})), (Pairs{{0, 0}, {1, 1}, {2, 2}})) << "not regular";
     auto every_other = files(3, {0, 66667, 133333});
     every_other.numbers = {0, 2, 4};
-    EXPECT_EQ(pairs_of(files(6), every_other), (Pairs{{0, 0}, {2, 1}, {4, 2}})) << "the originals' own numbers";
+    EXPECT_EQ(pairs_of_files(files(6), every_other), (Pairs{{0, 0}, {2, 1}, {4, 2}})) << "the originals' own numbers";
 }
 
 TEST(FramePairs, MayBeOutOfStepWhereDecodedFilesTellNoTimes) {
