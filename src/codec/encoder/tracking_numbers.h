@@ -60,8 +60,8 @@ struct TrackingNumbers {
     AdultMillimetres grown_from{20};     // side of a square as large as what is uncovered in a region, from which on it
     int grown_after = 6;                 // is added, these many frames behind the last patch,
     AdultMillimetres grown_at_once{50};  // or at once
-    int forgotten_after = 150;        // frames for which a vertex was not seen: the next I-frame leaves it out
-    double most_grown = 2.5;          // as most_renewed_vertices, where the reference grows with what is seen
+    int forgotten_after = 150;           // frames for which a vertex was not seen: the next I-frame leaves it out
+    double most_grown = 2.5;             // as most_renewed_vertices, where the reference grows with what is seen
 
     // ---- When an I-frame is sent
     double most_others = 0.1;  // share of the vertices that have other texture coordinates: the atlas is laid out anew
