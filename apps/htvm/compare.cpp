@@ -198,8 +198,8 @@ void add_results(CLI::App& command, ComparisonRequest& o) {
 }
 
 constexpr const char* what_is_measured =
-    "Measure decoded meshes against their originals, frame by frame: by the numbers in their names, or in\n"
-    "the order of their names if they have none:\n"
+    "Measure decoded meshes against their originals, frame by frame: by the times that streams and PLY files\n"
+    "tell, else by the numbers in their names, or in the order of their names if they have none:\n"
     "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
     "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
     "  regions  the worst region of the surface, a ball of 10 cm: RMS distance there, in the worse direction; of\n"

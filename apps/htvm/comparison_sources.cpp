@@ -73,7 +73,7 @@ std::vector<std::int64_t> times_of(const MeshSource& source, const MeshSource& o
 std::vector<FramePair> pairs_of(const Sources& sources) {
     const auto& [original, decoded] = sources;
     const bool of_files = !original.is_stream && !decoded.is_stream;
-    auto pairs = of_files ? pair_by_number(original.numbers, decoded.numbers)
+    auto pairs = of_files ? pair_files(original, decoded)
                           : pair_by_time(times_of(original, decoded), times_of(decoded, original));
     const bool alike = !of_files && original.frames == decoded.frames && pairs.size() < original.frames;
     if (!pairs.empty() && !alike) return pairs;
@@ -99,6 +99,12 @@ void warn_of_frames_left_out(const Sources& sources, const std::vector<FramePair
     };
     tell(sources.original, sources.decoded, of_original);
     tell(sources.decoded, sources.original, of_decoded);
+    if (may_be_out_of_step(sources.original, sources.decoded))
+        warn(
+            fmt::format("{} has fewer frames than {}, and they are paired by number: where frames were left out while "
+                        "encoding, those behind are compared with others; compare the stream itself, or PLY files, "
+                        "which tell their times",
+                        sources.decoded.name, sources.original.name));
 }
 
 Result<Box> sequence_box(const ComparisonRequest& options, const std::vector<FramePair>& pairs) {

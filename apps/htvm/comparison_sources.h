@@ -15,8 +15,8 @@ struct Sources {
 };
 Result<Sources> open_sources(const ComparisonRequest& options);
 
-// The positions of the frames to compare: of files by the numbers in their names, of a stream by time; in order where
-// that pairs none, or fewer than there are though both sides have as many.
+// The positions of the frames to compare: of files by time or the numbers in their names, of a stream by time; in order
+// where that pairs none, or fewer than there are though both sides have as many.
 std::vector<FramePair> pairs_of(const Sources& sources);
 void warn_of_frames_left_out(const Sources& sources, const std::vector<FramePair>& pairs);
 void warn_of_sizes(const Sources& sources, const Mesh& original, const Mesh& decoded);

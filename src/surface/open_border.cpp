@@ -4,6 +4,8 @@
 #include <bit>
 #include <limits>
 
+#include "core/disjoint_sets.h"
+
 namespace htvm::internal {
 namespace {
 
@@ -74,6 +76,25 @@ double share_on_border(std::span<const Vector3f> positions, std::span<const Tria
         open += used[v] != 0 && border[v] != 0 ? 1 : 0;
     }
     return all == 0 ? 0 : static_cast<double>(open) / static_cast<double>(all);
+}
+
+bool comes_and_goes(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
+    constexpr double open = 0.02;             // share of the vertices on a border
+    constexpr double piece = 1.0 / 400;       // of the area: a hand is twice as large, a speck a tenth
+    constexpr std::size_t fewest_pieces = 5;  // a person, another one, a chair, a ball are four
+    if (share_on_border(positions, triangles) > open) return true;
+    const auto place = places_of(positions);
+    DisjointSets pieces(positions.size());
+    std::vector<double> area(positions.size(), 0);
+    double all = 0;
+    for (const auto& t : triangles) pieces.join(place[t[0]], place[t[1]]), pieces.join(place[t[1]], place[t[2]]);
+    for (const auto& t : triangles) {
+        const double own = length(area_vector(positions, t));
+        area[pieces.of(place[t[0]])] += own;
+        all += own;
+    }
+    return static_cast<std::size_t>(std::ranges::count_if(area, [&](double a) { return a > piece * all; })) >=
+           fewest_pieces;
 }
 
 }  // namespace htvm::internal

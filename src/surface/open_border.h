@@ -22,7 +22,9 @@ std::vector<std::uint8_t> edges_from_border(std::span<const Vector3f> positions,
 // 0.03 to 0.2 for views of depth cameras.
 double share_on_border(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
 
-// A capture with more on its border is one of surface that comes and goes.
-inline constexpr double open_from_share = 0.02;
+// Whether a capture that begins with this mesh is one of surface that comes and goes: where it has borders, or is in
+// pieces, as what a depth camera sees of a person is even if each piece was closed. Nothing else but people and what
+// they hold comes in so many. positions: of any unit.
+bool comes_and_goes(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
 
 }  // namespace htvm::internal

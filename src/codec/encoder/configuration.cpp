@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "codec/encoder/tracking_numbers.h"
+#include "core/geometry.h"
 #include "surface/open_border.h"
 
 namespace htvm::internal {
@@ -12,7 +13,8 @@ namespace {
 
 // The length on this subject that corresponds to a millimetre on an adult, in millimetres. Reaches, spacings and
 // thresholds are known for adults; those for a doll or a giant follow from its size. The extent of an adult depends on
-// the pose, so a subject from 1.1 to 2.5 m counts as an adult.
+// the pose, so a subject from 1.1 to 2.5 m counts as an adult. What is smaller may be a part of one, as a head and
+// shoulders before a phone: so its edges count, too, which on an adult are 8 mm long.
 double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
     constexpr double adult = 1750, shortest = 1100, longest = 2500;
     double size = options.subject_size;
@@ -24,7 +26,11 @@ double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
             size = std::max(size, static_cast<double>((*high)[axis]) - (*low)[axis]);
         }
     }
-    return size <= 0 || (size >= shortest && size <= longest) ? 1 : size / adult;
+    if (size <= 0 || (size >= shortest && size <= longest)) return 1;
+    if (size > longest || options.subject_size > 0) return size / adult;
+    constexpr double usual_edge = 8;
+    const double edge = mean_edge(std::span<const Vector3f>(mesh.positions), mesh.triangles, 8);
+    return std::clamp(edge / usual_edge, size / adult, 1.0);
 }
 
 // 1/16 mm on an adult and on whoever is larger, or finer if needed for a step of at least eight units. As much finer on
@@ -41,7 +47,7 @@ int lattice_bits(const EncoderOptions& options, double adult) {
 
 bool tells_presence(const EncoderOptions& options, const Mesh& first) {
     if (options.tracked.presence != SurfacePresence::automatic) return options.tracked.presence == SurfacePresence::on;
-    return options.key_interval > 1 && share_on_border(first.positions, first.triangles) > open_from_share;
+    return options.key_interval > 1 && comes_and_goes(first.positions, first.triangles);
 }
 
 FrameSteps steps_of(const Configuration& configuration, const QualitySteps& steps) {

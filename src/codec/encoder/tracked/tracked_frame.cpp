@@ -247,6 +247,15 @@ void judge(const FrameSource& source, const MovedSurface& moved, EncodedTrackedF
     out.state.presence = out.presence.shown;
 }
 
+// Of each vertex whether it matters where it lies: what is not shown costs nothing, nor what fills a hole. None: of
+// all.
+std::vector<std::uint8_t> what_counts(const EncodedTrackedFrame& frame) {
+    auto out = frame.state.presence;
+    for (std::size_t v = 0; v < std::min(out.size(), frame.seen.size()); ++v)
+        if (frame.seen[v] == 0) out[v] = 0;
+    return out;
+}
+
 struct CodedFields {
     EncodedField displacement;
     std::optional<EncodedField> colours;  // none where the reference has no colours
@@ -255,14 +264,14 @@ struct CodedFields {
 
 // price: by how much less a bit of the displacement should cost.
 Result<CodedFields> code_fields(const FrameSource& source, const MovedSurface& moved, const TrackedTargets& targets,
-                                LatticeUnits geometry_step, double price) {
+                                std::span<const std::uint8_t> counts, LatticeUnits geometry_step, double price) {
     const auto& reference = source.reference;
     const auto& options = source.options;
     const TrackedState* before = source.before;
     const double step = geometry_step.value, colour_step = options.motion_alone ? field_limit : options.colour_step;
-    const FieldOptions geometry{.step = {step, step, step}, .lambda = options.lambda * price};
+    const FieldOptions geometry{.step = {step, step, step}, .lambda = options.lambda * price, .counts = counts};
     const FieldOptions colour{
-        .step = {colour_step, colour_step, colour_step}, .lambda = options.lambda, .turned = true};
+        .step = {colour_step, colour_step, colour_step}, .lambda = options.lambda, .turned = true, .counts = counts};
     CodedFields out;
     Result<EncodedField> displacement, colours;
     const auto code_displacement = [&] {
@@ -343,7 +352,7 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     const auto step = options.motion_alone ? LatticeUnits(field_limit) : options.geometry_step;
     const double price = options.noise ? options.noise->price : price_of_bits(out.targets, step);
     if (options.keeps_noise) out.noise.price = price;
-    auto fields = code_fields(source, moved, targets, step, price);
+    auto fields = code_fields(source, moved, targets, what_counts(out), step, price);
     if (!fields) return tl::unexpected(fields.error());
     clock.done("fields");
     finish(source, steps, std::move(motion), std::move(*fields), out);

@@ -54,13 +54,36 @@ struct ComponentPlan {
 
 using Means = std::vector<std::vector<std::int32_t>>;  // as FieldPlane::mean, of the field to be coded
 
-// The means of all nodes from those of the vertices, which are in place.
-void fill_means(const VertexHierarchy& hierarchy, Means& means) {
+// Which nodes have a vertex below whose value counts. [0]: the vertices, [1 + k]: level k; none: all do.
+using Counting = std::vector<std::vector<std::uint8_t>>;
+
+Counting counting_of(const VertexHierarchy& hierarchy, std::span<const std::uint8_t> counts) {
+    Counting out;
+    if (counts.empty()) return out;
+    out.emplace_back(counts.begin(), counts.end());
+    for (const auto& level : hierarchy.levels) {
+        const auto& below = out.back();
+        std::vector<std::uint8_t> here(level.size());
+        for (std::size_t p = 0; p < here.size(); ++p)
+            here[p] = below[level.first[p]] != 0 || (level.second[p] != no_node && below[level.second[p]] != 0);
+        out.push_back(std::move(here));
+    }
+    return out;
+}
+
+// The means of all nodes from those of the vertices, which are in place. What does not count takes the mean of what it
+// is joined to.
+void fill_means(const VertexHierarchy& hierarchy, const Counting& counting, Means& means) {
     means.resize(hierarchy.levels.size() + 1);
     for (std::size_t k = 0; k < hierarchy.levels.size(); ++k) {
         const HierarchyLevel& level = hierarchy.levels[k];
         means[k + 1].resize(level.size());
         for (std::size_t p = 0; p < level.size(); ++p) {
+            if (!counting.empty() && level.second[p] != no_node) {
+                const bool first = counting[k][level.first[p]] != 0, second = counting[k][level.second[p]] != 0;
+                if (first && !second) means[k][level.second[p]] = means[k][level.first[p]];
+                if (!first && second) means[k][level.first[p]] = means[k][level.second[p]];
+            }
             const std::int64_t a = means[k][level.first[p]];
             std::int64_t mean = a;
             if (level.second[p] != no_node) {
@@ -75,8 +98,8 @@ void fill_means(const VertexHierarchy& hierarchy, Means& means) {
 }
 
 // The means of component c.
-Means means_of(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values, std::size_t components,
-               std::size_t c, bool turned) {
+Means means_of(const VertexHierarchy& hierarchy, const Counting& counting, std::span<const std::int32_t> values,
+               std::size_t components, std::size_t c, bool turned) {
     Means means(1);
     auto& of_vertices = means[0];
     of_vertices.resize(hierarchy.vertex_count);
@@ -92,18 +115,20 @@ Means means_of(const VertexHierarchy& hierarchy, std::span<const std::int32_t> v
         const double scaled = along * field_one;  // to the nearest, halves away from zero
         of_vertices[v] = static_cast<std::int32_t>(scaled + (scaled < 0 ? -0.5 : 0.5));
     }
-    fill_means(hierarchy, means);
+    fill_means(hierarchy, counting, means);
     return means;
 }
 
-// The weights of slopes and of the frame before that leave the least squared error, and bits for saying so.
+// The weights of slopes and of the frame before that leave the least squared error, and bits for saying so. counting:
+// of the level's nodes, or none.
 LevelMode choose_mode(const HierarchyLevel& level, std::span<const std::int32_t> finer,
-                      const LevelPrediction& prediction, const LevelMode& above, std::uint32_t step, double lambda) {
+                      std::span<const std::uint8_t> counting, const LevelPrediction& prediction, const LevelMode& above,
+                      std::uint32_t step, double lambda) {
     const bool history = !prediction.before.empty();
     // Products of: difference, its prediction by slopes, difference before, its prediction before.
     std::array<std::array<double, 4>, 4> product{};
     for (std::size_t p = 0; p < level.size(); ++p) {
-        if (level.second[p] == no_node) continue;
+        if (level.second[p] == no_node || (!counting.empty() && counting[p] == 0)) continue;
         const double weight = 1.0 / (1.0 * level.split_scale[p] * level.split_scale[p]);
         std::array<double, 4> x{1.0 * finer[level.first[p]] - finer[level.second[p]], 1.0 * prediction.now[p], 0, 0};
         if (history) x[2] = prediction.before[p], x[3] = prediction.slope_before[p];
@@ -133,7 +158,7 @@ LevelMode choose_mode(const HierarchyLevel& level, std::span<const std::int32_t>
 // Quantises one level of one component, weighing squared error against bits as the models stand. The mode must have
 // been chosen. False where nothing is worth its bits.
 bool quantise_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<const std::int32_t> finer,
-                    const LevelMode& mode, double lambda, DecisionLog& log) {
+                    std::span<const std::uint8_t> counting, const LevelMode& mode, double lambda, DecisionLog& log) {
     const HierarchyLevel& level = walk.hierarchy.levels[k];
     ComponentWalk& component = walk.components[c];
     const SplitModels models_before = component.models;
@@ -141,7 +166,7 @@ bool quantise_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<con
     auto choose = [&](std::size_t p, std::int32_t predicted, std::int64_t step, const SplitContext& context,
                       const auto& sign) {
         const std::int64_t difference = std::int64_t{finer[level.first[p]]} - finer[level.second[p]] - predicted;
-        if (2 * std::abs(difference) < step) return 0;
+        if (2 * std::abs(difference) < step || (!counting.empty() && counting[p] == 0)) return 0;
         const double off = static_cast<double>(difference) / static_cast<double>(step);
         auto best = static_cast<std::int32_t>(std::round(off));
         if (lambda > 0) {
@@ -190,8 +215,8 @@ struct ProgressEnd {
 };
 
 // Plans component c; where its rests are needed before those of a level can be chosen, waits for `awaited`.
-ComponentPlan plan_component(FieldWalk& walk, std::size_t c, const Means& means, double lambda, Progress& progress,
-                             const Progress* awaited) {
+ComponentPlan plan_component(FieldWalk& walk, std::size_t c, const Means& means, const Counting& counting,
+                             double lambda, Progress& progress, const Progress* awaited) {
     const ProgressEnd end{progress};
     ComponentWalk& component = walk.components[c];
     const std::size_t levels = walk.hierarchy.levels.size();
@@ -203,10 +228,11 @@ ComponentPlan plan_component(FieldWalk& walk, std::size_t c, const Means& means,
               static_cast<std::int32_t>(divide_rounded(means.back()[0] - from, unit)));
     for (std::size_t k = levels; k-- > 0;) {
         walk.begin_level(k, c);
-        LevelMode mode = choose_mode(walk.hierarchy.levels[k], means[k], component.prediction, component.last,
+        const auto counts = counting.empty() ? std::span<const std::uint8_t>() : std::span(counting[k + 1]);
+        LevelMode mode = choose_mode(walk.hierarchy.levels[k], means[k], counts, component.prediction, component.last,
                                      component.step, lambda);
         if (awaited) awaited->await(levels - k);
-        mode.coded = quantise_level(walk, k, c, means[k], mode, lambda, plan.rests[k]);
+        mode.coded = quantise_level(walk, k, c, means[k], counts, mode, lambda, plan.rests[k]);
         component.last = plan.modes[k] = mode;
         walk.end_level(k, c, mode);
         progress.reach(levels - k);
@@ -215,14 +241,16 @@ ComponentPlan plan_component(FieldWalk& walk, std::size_t c, const Means& means,
 }
 
 // Plans all components, the first two beside the third, which comes behind `beside`.
-std::vector<ComponentPlan> plan_field(FieldWalk& walk, std::span<const std::int32_t> values, bool turned, double lambda,
-                                      Threads threads, const std::function<void()>& beside) {
+std::vector<ComponentPlan> plan_field(FieldWalk& walk, std::span<const std::int32_t> values,
+                                      const FieldOptions& options, Threads threads,
+                                      const std::function<void()>& beside) {
     const std::size_t components = walk.components.size();
     std::vector<ComponentPlan> plans(components);
     std::array<Progress, most_field_components> progress;
+    const auto counting = counting_of(walk.hierarchy, options.counts);
     auto plan = [&](std::size_t c) {
-        plans[c] = plan_component(walk, c, means_of(walk.hierarchy, values, components, c, turned), lambda, progress[c],
-                                  c > 0 ? &progress[c - 1] : nullptr);
+        plans[c] = plan_component(walk, c, means_of(walk.hierarchy, counting, values, components, c, options.turned),
+                                  counting, options.lambda, progress[c], c > 0 ? &progress[c - 1] : nullptr);
     };
     // The third waits for what the first two do, which begins before it on any number of threads.
     parallel_invoke(
@@ -282,6 +310,8 @@ Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<co
         return fail(ErrorKind::bad_input, "vertex field: only three components can be turned");
     if (!(options.lambda >= 0 && options.lambda <= 1e6))
         return fail(ErrorKind::bad_input, "vertex field: lambda must be between 0 and 10^6");
+    if (!options.counts.empty() && options.counts.size() != hierarchy.vertex_count)
+        return fail(ErrorKind::bad_input, "vertex field: it must be told of each vertex whether its value counts");
     const auto steps = steps_of(values, components, options);
     if (!steps) return tl::unexpected(steps.error());
     if (before && !history_fits(*before, hierarchy, components, options.turned))
@@ -290,7 +320,7 @@ Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<co
     out.steps = *steps;
     FieldWalk walk(hierarchy, *steps, components, before);
     if (hierarchy.vertex_count > 0)
-        out.decisions = in_order(walk, plan_field(walk, values, options.turned, options.lambda, threads, beside));
+        out.decisions = in_order(walk, plan_field(walk, values, options, threads, beside));
     else if (beside)
         beside();
     out.history = history_of(walk, steps->turned);
