@@ -96,5 +96,32 @@ TEST(OpenBorder, TheShareOnItIsOfTheVerticesThatTrianglesName) {
     EXPECT_EQ(edges_from_border(surface.positions, surface.triangles).back(), far_from_border);
 }
 
+// So many closed pieces of one size, one beside the other, after a large one.
+Surface pieces(std::size_t number, float size) {
+    Surface out;
+    for (std::size_t i = 0; i <= number; ++i) {
+        const auto first = static_cast<std::uint32_t>(out.positions.size());
+        const auto one = tetrahedron();
+        for (auto p : one.positions) {
+            for (auto& c : p) c *= i == 0 ? 1000 : size;
+            p[0] += 2000 * static_cast<float>(i);
+            out.positions.push_back(p);
+        }
+        for (const auto& t : one.triangles) out.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+    }
+    return out;
+}
+
+bool comes_and_goes(const Surface& surface) { return internal::comes_and_goes(surface.positions, surface.triangles); }
+
+TEST(OpenBorder, SurfaceComesAndGoesWhereItHasBordersOrIsInPieces) {
+    EXPECT_TRUE(comes_and_goes(grid()));
+    EXPECT_FALSE(comes_and_goes(tetrahedron()));
+    EXPECT_FALSE(comes_and_goes(pieces(3, 500))) << "a person, another one, a chair, a ball";
+    EXPECT_TRUE(comes_and_goes(pieces(4, 500))) << "a person in closed pieces";
+    EXPECT_FALSE(comes_and_goes(pieces(20, 20))) << "specks do not count";
+    EXPECT_FALSE(comes_and_goes(Surface{}));
+}
+
 }  // namespace
 }  // namespace htvm::internal
