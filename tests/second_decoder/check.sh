@@ -110,6 +110,12 @@ for group in 2 5 8; do
     same fast_normals "$work/fast_normals" --profile tracked --group $group -q 60
 done
 contains tracked
+# Presence: of a person what one depth camera sees.
+"$htvm" synth "$work/seen" --vertices 800 --frames 6 --motion calm --cameras 1 >/dev/null 2>&1
+for group in 1 3; do
+    same seen "$work/seen" --profile tracked --presence on --group $group
+    contains tracked
+done
 for stream in "$here"/../data/conformance/*.htvm; do
     stored "$stream"
 done
