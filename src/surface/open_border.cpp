@@ -32,15 +32,15 @@ std::vector<std::uint32_t> places_of(std::span<const Vector3f> positions) {
     return out;
 }
 
-// The vertices on a border, by place. Around a vertex inside, each side that leads away from it in one triangle leads
-// back in another, so what is added for the one is taken off for the other.
+// The vertices on a border, by place. Around a vertex inside, each side that leads away from it belongs to two
+// triangles, however they face, so what both add cancels out.
 std::vector<std::uint8_t> on_border(std::span<const Triangle> triangles, std::span<const std::uint32_t> place) {
     std::vector<std::uint64_t> left(place.size(), 0);
     for (const auto& t : triangles) {
         const Triangle at{place[t[0]], place[t[1]], place[t[2]]};
         if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
         for (std::size_t i = 0; i < 3; ++i)
-            left[at[i]] += scattered(at[(i + 1) % 3] + 1u) - scattered(at[(i + 2) % 3] + 1u);
+            left[at[i]] ^= scattered(at[(i + 1) % 3] + 1u) ^ scattered(at[(i + 2) % 3] + 1u);
     }
     std::vector<std::uint8_t> out(place.size());
     for (std::size_t v = 0; v < out.size(); ++v) out[v] = left[place[v]] != 0 ? 1 : 0;

@@ -94,7 +94,7 @@ TEST(CaptureKind, ASizeThatEdgesDisagreeWithIsNoUnit) {
     EXPECT_EQ(kind.odd_size(two), "");
     auto coarse = person(1);  // every third vertex, longer edges
     coarse.triangles.clear();
-    for (std::uint32_t i = 12; i < 60; ++i) coarse.triangles.push_back({i - 12, i - 6, i});
+    for (std::uint32_t i = 36; i < 60; ++i) coarse.triangles.push_back({i - 36, i - 18, i});
     EXPECT_GT(size_of(coarse).edge, 1.5 * size_of(person()).edge);
     EXPECT_EQ(kind.odd_size(coarse), "");
 }

@@ -546,6 +546,7 @@ TEST(CInterface, CarriesSessionSceneAndMetadata) {
     ASSERT_EQ(htvm_encoder_options_create(HTVM_PROFILE_TRACKED, nullptr, &options), HTVM_OK);
     EXPECT_EQ(htvm_encoder_options_set(options, "session", "4711"), HTVM_OK);
     EXPECT_EQ(htvm_encoder_options_set(options, "up", "-z"), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_options_set(options, "tracked.presence", "off"), HTVM_OK);  // a triangle has borders
     EXPECT_EQ(htvm_encoder_options_set_floor(options, 12.5), HTVM_OK);
     const int64_t shift[3] = {500000000, -1, 4649776000};
     EXPECT_EQ(htvm_encoder_options_set_global_shift(options, shift), HTVM_OK);

@@ -89,6 +89,7 @@ TEST(TopologyNumber, ChangesAtFramesThatCodeAMeshAlone) {
         for (const auto& packet : packets) {
             const auto frame = decoder.decode(packet);
             if (!frame || !*frame) continue;
+            if (decoder.sequence()->version >= presence_version) break;  // there it changes with what is there, too
             const auto type = (*frame)->info.type;
             if (type == FrameType::tracked || type == FrameType::predicted) {
                 EXPECT_EQ((*frame)->topology, of_intra) << packet.frame;

@@ -80,12 +80,15 @@ TEST(OpenBorder, IsAroundAMissingTriangle) {
     EXPECT_EQ(edges[v - side], 1);
 }
 
-TEST(OpenBorder, IsWhereTrianglesFaceAgainstEachOther) {
-    auto surface = grid();
+TEST(OpenBorder, IsNotWhereTrianglesFaceAgainstEachOtherNorWhereTheyAreThereTwice) {
+    const auto surface = grid();
+    auto turned = surface, doubled = surface;
     const std::uint32_t v = 4 * side + 4;
-    std::ranges::replace(surface.triangles, Triangle{v, v + 1, v + side}, Triangle{v, v + side, v + 1});
-    const auto edges = edges_from_border(surface.positions, surface.triangles);
-    for (const auto u : {v, v + 1, v + side}) EXPECT_EQ(edges[u], 0);
+    std::ranges::replace(turned.triangles, Triangle{v, v + 1, v + side}, Triangle{v, v + side, v + 1});
+    for (const auto& t : surface.triangles) doubled.triangles.push_back({t[0], t[2], t[1]});
+    EXPECT_EQ(edges_from_border(turned.positions, turned.triangles),
+              edges_from_border(surface.positions, surface.triangles));
+    EXPECT_TRUE(all_far(edges_from_border(doubled.positions, doubled.triangles)));
 }
 
 TEST(OpenBorder, TheShareOnItIsOfTheVerticesThatTrianglesName) {

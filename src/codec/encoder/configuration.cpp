@@ -11,11 +11,16 @@
 namespace htvm::internal {
 namespace {
 
+bool tells_presence(const EncoderOptions& options, const Mesh& first) {
+    if (options.tracked.presence != SurfacePresence::automatic) return options.tracked.presence == SurfacePresence::on;
+    return options.key_interval > 1 && comes_and_goes(first.positions, first.triangles);
+}
+
 // The length on this subject that corresponds to a millimetre on an adult, in millimetres. Reaches, spacings and
 // thresholds are known for adults; those for a doll or a giant follow from its size. The extent of an adult depends on
-// the pose, so a subject from 1.1 to 2.5 m counts as an adult. What is smaller may be a part of one, as a head and
-// shoulders before a phone: so its edges count, too, which on an adult are 8 mm long.
-double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
+// the pose, so a subject from 1.1 to 2.5 m counts as an adult. What is smaller and seen from some sides alone may be a
+// part of one, as a head and shoulders before a phone: so its edges count, too, which on an adult are 8 mm long.
+double adult_millimetre(const EncoderOptions& options, const Mesh& mesh, bool may_be_a_part) {
     constexpr double adult = 1750, shortest = 1100, longest = 2500;
     double size = options.subject_size;
     if (!(size > 0)) {
@@ -27,7 +32,7 @@ double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
         }
     }
     if (size <= 0 || (size >= shortest && size <= longest)) return 1;
-    if (size > longest || options.subject_size > 0) return size / adult;
+    if (!may_be_a_part || size > longest || options.subject_size > 0) return size / adult;
     constexpr double usual_edge = 8;
     const double edge = mean_edge(std::span<const Vector3f>(mesh.positions), mesh.triangles, 8);
     return std::clamp(edge / usual_edge, size / adult, 1.0);
@@ -45,11 +50,6 @@ int lattice_bits(const EncoderOptions& options, double adult) {
     return std::clamp(std::max(bits_for(8), std::min(of_size, bits_for(64))), 4, 16);
 }
 
-bool tells_presence(const EncoderOptions& options, const Mesh& first) {
-    if (options.tracked.presence != SurfacePresence::automatic) return options.tracked.presence == SurfacePresence::on;
-    return options.key_interval > 1 && comes_and_goes(first.positions, first.triangles);
-}
-
 FrameSteps steps_of(const Configuration& configuration, const QualitySteps& steps) {
     return {static_cast<std::int32_t>(std::clamp(std::lround(steps.geometry_step * configuration.scale.units), 1L,
                                                  static_cast<long>(lattice_limit))),
@@ -64,7 +64,8 @@ Result<PoseTracker> configure(Configuration& configuration, const Mesh& mesh, co
     const auto origin = lattice_origin(mesh);
     if (!origin) return tl::unexpected(origin.error());
     header.lattice.origin = *origin;
-    const double adult = adult_millimetre(options, mesh);
+    const bool comes_and_goes = options.profile == Profile::tracked && tells_presence(options, mesh);
+    const double adult = adult_millimetre(options, mesh, comes_and_goes);
     header.lattice.bits = lattice_bits(options, adult);
     auto tracker = make_pose_tracker(options.skeleton, mesh, pose);
     if (!tracker) return tl::unexpected(tracker.error());
@@ -104,7 +105,7 @@ Result<PoseTracker> configure(Configuration& configuration, const Mesh& mesh, co
     header.nearest_vertices = static_cast<std::uint8_t>(options.topology.nearest_vertices);
     header.weight_width = on_lattice(options.topology.weight_width * units);
     if (options.profile == Profile::tracked) {
-        if (tells_presence(options, mesh)) header.version = presence_version;
+        if (comes_and_goes) header.version = presence_version;
         const double spacing = options.tracked.node_spacing > 0 ? options.tracked.node_spacing
                                                                 : tracking_numbers.node_spacing.value * adult;
         header.node_spacing = std::max(on_lattice(spacing * units), 1);
