@@ -275,6 +275,27 @@ std::optional<std::vector<std::uint8_t>> bytes_by(const TestSequence& sequence, 
     return encode(sequence, options).bytes;
 }
 
+// A ball without its lower end, with a speck beside it; from the third frame on there is a hole in it.
+TestSequence coming_and_going() {
+    auto out = horned_ball(6, never);
+    for (std::size_t t = 0; t < out.frames.size(); ++t) {
+        auto& mesh = out.frames[t].mesh;
+        std::erase_if(mesh.triangles, [&](const Triangle& triangle) {
+            const auto& p = mesh.positions[triangle[0]];
+            return p[2] < -200 || (t > 1 && p[0] > 250);
+        });
+        const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+        for (const auto& p :
+             {Vector3f{-500, 0, 0}, Vector3f{-488, 0, 0}, Vector3f{-500, 12, 0}, Vector3f{-488, 12, 0}}) {
+            mesh.positions.push_back(p);
+            mesh.colours.push_back({90, 90, 90});
+        }
+        mesh.triangles.push_back({first, first + 1, first + 2});
+        mesh.triangles.push_back({first + 1, first + 3, first + 2});
+    }
+    return out;
+}
+
 TEST(OptionList, EveryOptionChangesTheBytesButThreads) {
     // A person moves, and is two metres away in the last frame: a scene change.
     auto sequence = walking(5, 300);
@@ -285,14 +306,18 @@ TEST(OptionList, EveryOptionChangesTheBytesButThreads) {
     }
     for (auto& p : sequence.frames.back().mesh.positions) p[0] += 2000;
     const auto lost_in_part = horned_ball(3);
+    const auto in_sight = coming_and_going();
     for (const auto& option : option_list()) {
         bool changes = false;
         for (auto settings : settings_for(option)) {
             const bool patches = std::string(option.name) == "tracked.patch_share";
+            const bool seen =
+                std::string(option.name) == "tracked.fill" || std::string(option.name) == "tracked.specks";
             const auto& tried_on = patches                                 ? lost_in_part
+                                   : seen                                  ? in_sight
                                    : std::string(option.name) == "normals" ? with_normals
                                                                            : sequence;
-            if (patches) settings.subject_size = patched_options().subject_size;
+            if (patches || seen) settings.subject_size = patched_options().subject_size;
             const auto before = bytes_by(tried_on, settings);
             ASSERT_TRUE(before.has_value());
             for (const double value : values_of(option)) {
