@@ -275,22 +275,25 @@ std::optional<std::vector<std::uint8_t>> bytes_by(const TestSequence& sequence, 
     return encode(sequence, options).bytes;
 }
 
-// A speck beside the body all the time, and a hole in it from the third frame on.
-TestSequence with_hole_and_speck(TestSequence sequence) {
-    const auto place = sequence.frames.front().mesh.positions[sequence.frames.front().mesh.triangles[0][0]];
-    const auto is_near = [&](const Vector3f& p) {
-        return std::hypot(p[0] - place[0], p[1] - place[1], p[2] - place[2]) < 250;
-    };
-    for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
-        auto& mesh = sequence.frames[k].mesh;
-        if (k >= 2) std::erase_if(mesh.triangles, [&](const Triangle& t) { return is_near(mesh.positions[t[0]]); });
+// A ball without its lower end, with a speck beside it; from the third frame on there is a hole in it.
+TestSequence coming_and_going() {
+    auto out = horned_ball(6, never);
+    for (std::size_t t = 0; t < out.frames.size(); ++t) {
+        auto& mesh = out.frames[t].mesh;
+        std::erase_if(mesh.triangles, [&](const Triangle& triangle) {
+            const auto& p = mesh.positions[triangle[0]];
+            return p[2] < -200 || (t > 1 && p[0] > 250);
+        });
         const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-        for (const Vector3f& corner : {Vector3f{0, 0, 0}, Vector3f{9, 0, 0}, Vector3f{0, 9, 0}})
-            mesh.positions.push_back({place[0] + 400 + corner[0], place[1] + corner[1], place[2]});
-        mesh.colours.resize(mesh.colours.empty() ? 0 : mesh.positions.size());
+        for (const auto& p :
+             {Vector3f{-500, 0, 0}, Vector3f{-488, 0, 0}, Vector3f{-500, 12, 0}, Vector3f{-488, 12, 0}}) {
+            mesh.positions.push_back(p);
+            mesh.colours.push_back({90, 90, 90});
+        }
         mesh.triangles.push_back({first, first + 1, first + 2});
+        mesh.triangles.push_back({first + 1, first + 3, first + 2});
     }
-    return sequence;
+    return out;
 }
 
 TEST(OptionList, EveryOptionChangesTheBytesButThreads) {
@@ -303,19 +306,18 @@ TEST(OptionList, EveryOptionChangesTheBytesButThreads) {
     }
     for (auto& p : sequence.frames.back().mesh.positions) p[0] += 2000;
     const auto lost_in_part = horned_ball(3);
-    const auto comes_and_goes = with_hole_and_speck(sequence);
+    const auto in_sight = coming_and_going();
     for (const auto& option : option_list()) {
         bool changes = false;
         for (auto settings : settings_for(option)) {
             const bool patches = std::string(option.name) == "tracked.patch_share";
-            const bool presence =
+            const bool seen =
                 std::string(option.name) == "tracked.fill" || std::string(option.name) == "tracked.specks";
             const auto& tried_on = patches                                 ? lost_in_part
-                                   : presence                              ? comes_and_goes
+                                   : seen                                  ? in_sight
                                    : std::string(option.name) == "normals" ? with_normals
                                                                            : sequence;
-            if (presence) settings.tracked.presence = SurfacePresence::on;
-            if (patches) settings.subject_size = patched_options().subject_size;
+            if (patches || seen) settings.subject_size = patched_options().subject_size;
             const auto before = bytes_by(tried_on, settings);
             ASSERT_TRUE(before.has_value());
             for (const double value : values_of(option)) {
