@@ -76,6 +76,7 @@ stream tiny_in_part tiny --unit mm -q 20 --still-below 60 --animation-error 0 --
 stream tiny_tracked tiny --unit mm -q 30 --profile tracked -s "$tiny"
 stream tiny_tracked_intra tiny --unit mm -q 30 --profile tracked --tracked-from intra
 stream tiny_grouped tiny --unit mm -q 30 --profile tracked --group 3
+stream tiny_presence tiny --unit mm -q 30 --profile tracked --group 2 --presence on
 stream tiny_paper tiny --unit mm -q 10 --profile paper -s "$tiny"
 
 head -c 100 "$work/normals/frame_00060.ply" >"$out/import_ply/cut_off"

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "command_line/headings.h"
+#include "command_line/subject_height.h"
 #include "command_line/terminal.h"
 #include "io/recording.h"
 #include "io/skeleton_align.h"
@@ -30,12 +31,6 @@ double height_of(const Mesh& mesh, UpAxis up) {
         return bounds ? static_cast<double>(bounds->high[axis]) - static_cast<double>(bounds->low[axis]) : 0.0;
     };
     return up == UpAxis::unknown ? std::max(along(1), along(2)) : along(number_of(up));
-}
-
-std::string length_text(double millimetres) {
-    if (millimetres < 10) return fmt::format("{:.2g} mm", millimetres);
-    if (millimetres < 1000) return fmt::format("{:.0f} cm", millimetres / 10);
-    return fmt::format("{:.2f} m", millimetres / 1000);
 }
 
 // The rate at which the median interval repeats.
@@ -375,18 +370,35 @@ Result<std::optional<TexturedMesh>> Capture::read_next_file() {
     return std::optional<TexturedMesh>{std::move(*mesh)};
 }
 
-// Reads the first mesh that can be read and has vertices.
+// Whether a mesh has neither colours nor an image, while images lie beside others: it is no example of the capture.
+bool Capture::lacks_its_image(const TexturedMesh& mesh) const {
+    const bool needs_one = texture_use() != TextureUse::none && options_.texture.files.empty() && !mesh.texture &&
+                           mesh.mesh.colours.empty() && !mesh.mesh.texcoords.empty();
+    return needs_one && !textures_.known_images().empty();
+}
+
+// Reads the first mesh that can be read, has vertices and does not lack its image; of several that lack it the first.
 Result<void> Capture::find_first() {
     std::optional<Error> error;
     millimetres_per_unit_ = 1;
+    constexpr std::size_t most_without_image = 16;
+    std::size_t without_image = 0;
     for (std::size_t end = begin_ + frames_;;) {
         auto mesh = pipe_ ? read_pipe() : read_next_file();
         if (mesh && !*mesh) break;
-        if (mesh) peeked_ = std::move(**mesh);
-        if (mesh) peeked_at_ = *at_;
         if (!mesh && !error) error = mesh.error();
-        if (pipe_ || (peeked_ && !peeked_->mesh.positions.empty()) || next_ == end) break;
+        const bool has_vertices = mesh && !(*mesh)->mesh.positions.empty();
+        const bool serves = has_vertices && (pipe_ || !lacks_its_image(**mesh));
+        if (mesh && (serves || !peeked_ || peeked_->mesh.positions.empty())) {
+            peeked_ = std::move(**mesh);
+            peeked_at_ = *at_;
+        }
+        without_image += has_vertices && !serves;
+        if (pipe_ || serves || next_ == end || without_image == most_without_image) break;
     }
+    // What was found in it, once more.
+    if (peeked_ && without_image > 0 && *at_ != peeked_at_)
+        if (auto again = textures().read(peeked_at_, texture_use(), mesh_options())) peeked_ = std::move(*again);
     if (!peeked_ && error) return tl::unexpected(*error);
     if (!peeked_)
         return fail(ErrorKind::bad_input, "there is no mesh in " + (pipe_ ? "standard input" : input_name(options_)));
@@ -395,29 +407,34 @@ Result<void> Capture::find_first() {
 
 // From the first mesh, in its file's unit.
 Result<void> Capture::find_unit() {
-    const bool guessed = !options_.unit && options_.height == 0 && options_.scale == 1;
     const auto of_format = pipe_ ? std::nullopt : unit_of_frames(files_, peeked_at_);
-    const auto unit = options_.unit ? *options_.unit : of_format.value_or(guess_unit(peeked_->mesh));
+    const auto near = first_near_origin();
+    if (!near) return tl::unexpected(near.error());
+    const auto unit = options_.unit ? *options_.unit : of_format.value_or(guess_unit(*near));
     millimetres_per_unit_ = options_.scale * millimetres_per(unit);
-    const double tall = height_of(peeked_->mesh, options_.up);
+    const double tall = height_of(*near, options_.up);
     if (options_.height > 0) {
         if (!(tall > 0)) return fail(ErrorKind::bad_input, "--height: the first mesh is flat; give --scale or --up");
         // In whole micrometres, as the stream keeps it.
         millimetres_per_unit_ = std::max(std::round(1e6 * options_.height / tall), 1.0) / 1000;
     }
-    constexpr double shortest = 400, tallest = 2600;  // millimetres, of people
-    const double millimetres = tall * millimetres_per_unit_;
-    if (guessed && tall > 0) {
-        const std::string format = files_.recording ? files_.recording->format : "glTF";
-        const auto looks = fmt::format("{} in {}, which makes the subject {} tall",
-                                       of_format ? format + " files are" : "the meshes look as if they were",
-                                       names_of(unit).name, length_text(millimetres));
-        if (millimetres < shortest || millimetres > tallest)
-            warn(looks + "; if that is wrong, give --unit or --height");
-        else if (unit != LengthUnit::millimetre && !of_format)
-            note(looks + " (see --unit)");
-    }
+    const bool guessed = !options_.unit && options_.height == 0 && options_.scale == 1;
+    if (!guessed) return {};
+    const auto* format = !of_format ? "" : files_.recording ? files_.recording->format.c_str() : "glTF";
+    const auto said = remark_on_height(tall, unit, format);
+    if (!said.text.empty()) (said.is_loss ? warn : note)(said.text);
     return {};
+}
+
+// The first mesh in its file's unit; where it is far from the origin, read anew without the distance, as floats lose of
+// its shape there.
+Result<Mesh> Capture::first_near_origin() {
+    constexpr double of_whole_units = 1000;
+    const auto shift = pipe_ ? GlobalShift{} : shift_of(peeked_->mesh, of_whole_units);
+    if (shift == GlobalShift{}) return peeked_->mesh;
+    auto options = mesh_options();
+    options.reading.origin = in_units(shift, of_whole_units);
+    return read_mesh_of(files_, peeked_at_, options);
 }
 
 // Meshes far from their origin are read anew without it, before their positions become floats.
@@ -441,18 +458,19 @@ Result<void> Capture::take_off_shift() {
 
 // What the frames have in common, from the first and some others.
 void Capture::find_kind() {
-    Mesh first = peeked_->mesh;
-    if (!scale_positions(first, millimetres_per_unit_)) return;
+    auto first =
+        shift_ == GlobalShift{} ? Result<Mesh>(peeked_->mesh) : read_mesh_of(files_, peeked_at_, mesh_options());
+    if (!first || (shift_ == GlobalShift{} && !scale_positions(*first, millimetres_per_unit_))) return;
     const auto& findings = textures_.findings();
-    kind_.add(first, findings, peeked_->texture != nullptr);
-    // Others besides the first: those of a texture need neither colours nor their range.
-    const std::size_t samples = findings.colour_levels.any() ? 8 : peeked_->texture ? 0 : 4;
+    kind_.add(*first, findings, peeked_->texture != nullptr);
+    const std::size_t samples = findings.colour_levels.any() ? 8 : 4;  // of others
     for (std::size_t k = 1; !pipe_ && k <= samples && frames_ > 1; ++k) {
         const auto place = begin_ + k * (frames_ - 1) / samples;
         if (place == peeked_at_ || (k > 1 && place == begin_ + (k - 1) * (frames_ - 1) / samples)) continue;
         MeshFindings others;
         const auto mesh = read_mesh_of(files_, place, mesh_options(), &others);
-        // Whether it has its image is said once it is encoded.
+        // Whether it has its image is said once it is encoded; one of a texture needs no range of colours.
+        if (peeked_->texture && !findings.colour_levels.any()) others = {};
         if (mesh) kind_.add(*mesh, others, peeked_->texture != nullptr);
     }
     colour_range_ = kind_.colour_range();
@@ -539,10 +557,24 @@ TextureUse Capture::texture_use() const {
     return options_.texture_as == TextureAs::by_default ? TextureUse::where_colourless : TextureUse::always;
 }
 
+// Warns of a frame whose size is odd, though it may be meant so.
+void Capture::tell_of_size(const Mesh& mesh) const {
+    const auto odd = kind_.odd_size(mesh);
+    if (odd.empty()) return;
+    constexpr std::size_t most = 3;  // by name
+    const std::lock_guard lock(told_->mutex);
+    if (!told_->odd_sizes.insert(name()).second) return;
+    if (told_->odd_sizes.size() <= most)
+        warn(fmt::format("{}: it is {}", name(), odd));
+    else if (told_->odd_sizes.size() == most + 1)
+        warn("more frames are of another size than the others: htvm check names them");
+}
+
 // What becomes of the first mesh's texture.
 void Capture::tell_of_texture() const {
     const auto& image = textures_.image_name();
-    const auto& [mesh, texture, file] = *peeked_;
+    const auto& mesh = peeked_->mesh;
+    const auto& texture = peeked_->texture;
     if (texture && keeps_pictures(options_.texture_as)) {
         note(fmt::format("the texture ({}, {} x {} pixels) is {}", image, texture->width, texture->height,
                          options_.texture_as == TextureAs::keep ? "kept as it is"
@@ -735,6 +767,8 @@ Result<std::optional<Mesh>> Capture::next() {
         if (!pipe_) return fail(ErrorKind::bad_input, fmt::format("{}: {}", name(), why));
         // What is live goes on: there is no other frame to take.
         tell({{"unlike", why, true}}, name());
+    } else if (options_.tells_odd_sizes) {
+        tell_of_size((*frame)->mesh);
     }
     textured_ = std::move((*frame)->textured);
     return std::optional<Mesh>{std::move((*frame)->mesh)};

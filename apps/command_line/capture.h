@@ -70,6 +70,7 @@ struct CaptureOptions {
     double skeleton_offset = 0;      // seconds added to the skeleton's clock
     TextureOptions texture;          // where images are
     TextureAs texture_as = TextureAs::by_default;
+    bool tells_odd_sizes = true;             // warns of frames whose size is odd; else who looks at all of them does
     bool keeps_idle_texcoords = true;        // texture coordinates for which no image is used, unless asked for
     WhileBusy while_busy = WhileBusy::wait;  // of standard input: what becomes of frames that come faster than they are
                                              // taken
@@ -144,13 +145,16 @@ private:
     Result<void> find_listed_times();
     void find_times_in_files();
     Result<void> find_poses();
+    bool lacks_its_image(const TexturedMesh& mesh) const;
     Result<void> find_first();
     Result<void> find_unit();
+    Result<Mesh> first_near_origin();
     Result<void> take_off_shift();
     void find_kind();
     Result<void> read_first_again();
     void find_floor();
     void tell(const std::vector<MeshRemark>& remarks, const std::string& name) const;
+    void tell_of_size(const Mesh& mesh) const;
     void tell_of_texture() const;
     TextureUse texture_use() const;
     TextureFiles& textures();
@@ -201,7 +205,8 @@ private:
     std::optional<ColourRange> colour_range_;  // of colours whose type does not say it
     struct Told {
         std::mutex mutex;
-        std::set<std::string> about;  // MeshRemark::about
+        std::set<std::string> about;      // MeshRemark::about
+        std::set<std::string> odd_sizes;  // frames, by name
     };
     std::shared_ptr<Told> told_ = std::make_shared<Told>();  // copies tell nothing twice
     UpAxis up_ = UpAxis::unknown;

@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "command_line/capture.h"
+#include "command_line/capture_kind.h"
 #include "command_line/interruption.h"
+#include "command_line/subject_height.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/lattice.h"
@@ -38,8 +40,11 @@ struct CheckedFrame {
     std::size_t doubled = 0, turned = 0;  // triangles (surface/triangle_cleaning.h)
     bool colours = false, normals = false, texcoords = false;
     int texture_width = 0, texture_height = 0;  // of its image; 0: none
-    bool repeats = false;                       // the same positions as the frame before
-    std::string wrong;                          // why encode does not take it; empty: it does
+    MeshSize size;
+    double farthest = 0;           // of its vertices from its middle, mm
+    std::vector<std::string> odd;  // what is not as in the other frames, clauses behind its name
+    bool repeats = false;          // the same positions as the frame before
+    std::string wrong;             // why encode does not take it; empty: it does
 };
 
 // What encoding some frames gave.
@@ -54,6 +59,7 @@ struct Report {
     double fps = 30;
     double millimetres_per_unit = 1;
     GlobalShift shift{};
+    std::string lacks_images;  // why no frame can be encoded, where it is the images alone; empty: some can
 };
 
 // ---- Looking at frames ----------------------------------------------------------------------------------------------
@@ -67,6 +73,8 @@ CheckedFrame look_at(const Capture& capture, const Mesh& mesh,
     const auto textured = capture.textured();
     const Mesh& captured = textured ? textured->mesh : mesh;
     out.facts = facts_of(mesh);
+    out.size = size_of(mesh);
+    out.farthest = farthest_from(out.size.middle, mesh);
     out.colours = !captured.colours.empty();
     out.normals = !captured.normals.empty();
     out.texcoords = !captured.texcoords.empty();
@@ -133,10 +141,22 @@ private:
     double fps_ = 30;
 };
 
+// The capture; without its images if no mesh could be read because of these alone, which is told in `lacks_images`.
+Result<Capture> open_capture(const CaptureOptions& options, std::string& lacks_images) {
+    auto capture = Capture::open(options);
+    if (capture || !options.texture.files.empty() || is_piped(options)) return capture;
+    auto without = options;
+    without.texture.files = "none";
+    auto bare = Capture::open(without);
+    if (!bare) return capture;
+    lacks_images = capture.error().message;
+    return bare;
+}
+
 Result<Report> look_at_all(const Options& options) {
-    auto capture = Capture::open(options.capture);
-    if (!capture) return tl::unexpected(capture.error());
     Report report;
+    auto capture = open_capture(options.capture, report.lacks_images);
+    if (!capture) return tl::unexpected(capture.error());
     report.fps = capture->fps();
     report.millimetres_per_unit = capture->millimetres_per_unit();
     report.shift = capture->global_shift();
@@ -213,10 +233,54 @@ std::size_t count_of(const Report& report, bool (*is)(const CheckedFrame&)) {
                                                   [&](const auto& frame) { return frame.wrong.empty() && is(frame); }));
 }
 
+// Values that frames usually have, by which others are odd.
+struct Usual {
+    MeshSize size;
+    double light = -1;  // 0..255; -1: no frame has colours
+};
+
+Usual usual_of(const Report& report) {
+    Usual out;
+    std::vector<MeshSize> sizes;
+    std::vector<double> light;
+    for (const auto& frame : report.frames) {
+        if (!frame.wrong.empty() || frame.size.reach == 0) continue;
+        sizes.push_back(frame.size);
+        if (frame.facts.light >= 0) light.push_back(frame.facts.light);
+    }
+    out.size = usual_size(sizes);
+    if (!light.empty()) out.light = middle_of(std::move(light));
+    return out;
+}
+
+// Another unit, a vertex far away, another light.
+std::vector<std::string> odd_of(const CheckedFrame& frame, const Usual& usual) {
+    std::vector<std::string> out;
+    if (!frame.wrong.empty() || frame.size.reach == 0) return out;
+    if (const auto scale = odd_scale(frame.size, usual.size); !scale.empty()) out.push_back("it is " + scale);
+    constexpr double far = 12;  // reaches: the hands and feet of people are three or four away
+    if (frame.farthest > far * std::max(frame.size.reach, usual.size.reach))
+        out.push_back(fmt::format("a vertex is {} from the middle of the subject", length_text(frame.farthest)));
+    constexpr double share = 1.0 / 3, white = 255, dim = 12;  // below that black is no oddity
+    const double light = frame.facts.light;
+    if (light >= 0 && usual.light > dim && light < share * usual.light)
+        out.push_back(fmt::format("it is {}: its brightness is {:.0f} of 255, usually {:.0f}",
+                                  light < 1 ? "black" : "far darker than the others", light, usual.light));
+    if (light >= 0 && usual.light < white - dim && white - light < share * (white - usual.light))
+        out.push_back(fmt::format("it is {}: its brightness is {:.0f} of 255, usually {:.0f}",
+                                  light > white - 1 ? "white" : "far brighter than the others", light, usual.light));
+    return out;
+}
+
+void find_odd_frames(Report& report) {
+    const auto usual = usual_of(report);
+    for (auto& frame : report.frames) frame.odd = odd_of(frame, usual);
+}
+
 struct Judgement {
     Spread vertices, triangles, height, edge, border, pieces, specks, strays, unused;
     double area_flicker = 0, light_flicker = 0;
-    std::size_t readable = 0, bad = 0, missing = 0, repeated = 0;
+    std::size_t readable = 0, bad = 0, missing = 0, repeated = 0, odd = 0;
     double doubled = 0, turned = 0;  // shares of the triangles
     std::vector<std::string> advice;
 };
@@ -229,6 +293,10 @@ void advise(const Report& report, Judgement& j) {
     if (j.missing > 0)
         say(fmt::format("{} by the numbers in the names: look for dropped frames; --fill repeats the one before",
                         counted(j.missing, "frame") + (j.missing == 1 ? " is missing" : " are missing")));
+    if (j.odd > 0)
+        say(fmt::format("{} not like the others, as said above: look at {}, and leave {} out with --ignore if need be",
+                        counted(j.odd, "frame") + (j.odd == 1 ? " is" : " are"), j.odd == 1 ? "it" : "them",
+                        j.odd == 1 ? "it" : "them"));
     if (j.repeated > 0)
         say(fmt::format("{} what the one before has: the rig's rate may be lower than its recording's",
                         counted(j.repeated, "frame") + (j.repeated == 1 ? " repeats" : " repeat")));
@@ -285,10 +353,12 @@ Judgement judge(const Report& report) {
         j.missing += frame.missing_before;
         ++(frame.wrong.empty() ? j.readable : j.bad);
         j.repeated += frame.repeats;
+        j.odd += !frame.odd.empty();
         doubled += static_cast<double>(frame.doubled);
         turned += static_cast<double>(frame.turned);
         triangles += static_cast<double>(frame.facts.triangles);
     }
+    if (!report.lacks_images.empty()) j.bad = report.frames.size();
     j.doubled = triangles > 0 ? doubled / triangles : 0;
     j.turned = triangles > 0 ? turned / triangles : 0;
     advise(report, j);
@@ -315,13 +385,26 @@ std::string attributes_of(const Report& report, const Judgement& j) {
     return out.empty() ? "none" : out;
 }
 
+// The first of the frames of which there is something to say, by name; count: of all of them.
+template <class Text>
+void print_frames(const char* what, const Report& report, std::size_t count, Text text_of_frame) {
+    constexpr std::size_t most = 10;
+    std::size_t told = 0;
+    for (const auto& frame : report.frames) {
+        const std::string text = text_of_frame(frame);
+        if (text.empty()) continue;
+        if (told++ < most) fmt::print("  {:<12} {}\n", what, text);
+        if (told == most + 1) fmt::print("  {:<12} {} in all\n", what, counted(count, "frame"));
+    }
+}
+
 void print_report(const Report& report, const Judgement& j, const std::string& input) {
     const auto& last = report.frames.back();
     fmt::print("{}: {} at {:g} frames/s, {:.2f} s\n", input, counted(report.frames.size(), "frame"), report.fps,
                static_cast<double>(last.timestamp_us - report.frames.front().timestamp_us) / 1e6 + 1 / report.fps);
     fmt::print("  vertices     {}\n  triangles    {}\n", text_of(j.vertices), text_of(j.triangles));
-    fmt::print("  size         {:.0f} mm tall, edges of {:.1f} mm, in units of {:g} mm\n", j.height.middle,
-               j.edge.middle, report.millimetres_per_unit);
+    fmt::print("  size         {} mm tall, edges of {:.1f} mm, in units of {:g} mm\n", text_of(j.height), j.edge.middle,
+               report.millimetres_per_unit);
     if (report.shift != GlobalShift{})
         fmt::print("  place        {:.0f}, {:.0f}, {:.0f} m from the origin\n",
                    static_cast<double>(report.shift[0]) / 1000, static_cast<double>(report.shift[1]) / 1000,
@@ -337,15 +420,17 @@ void print_report(const Report& report, const Judgement& j, const std::string& i
         fmt::print("  encoded      the first {} with the defaults: {:.2f} Mbit/s, {} I-, {} TP-frames\n",
                    counted(report.trial.frames, "frame"), report.trial.megabits_per_second, report.trial.intra,
                    report.trial.patched);
-    std::size_t told = 0;
-    for (const auto& frame : report.frames) {
-        constexpr std::size_t most = 10;
-        if (frame.wrong.empty()) continue;
-        if (told++ < most) fmt::print("  bad          {}\n", frame.wrong);
-        if (told == most + 1) fmt::print("  bad          {} in all\n", counted(j.bad, "frame"));
-    }
+    if (!report.lacks_images.empty())
+        fmt::print("  bad          every frame; the first of them: {}\n", report.lacks_images);
+    print_frames("bad", report, j.bad, [](const auto& frame) { return frame.wrong; });
+    print_frames("odd", report, j.odd, [](const auto& frame) {
+        std::string out;
+        for (const auto& clause : frame.odd) out += (out.empty() ? frame.name + ": " : "; ") + clause;
+        return out;
+    });
     if (j.advice.empty()) fmt::print("nothing to mend was found\n");
     for (const auto& line : j.advice) fmt::print("- {}\n", line);
+    fmt::print("'htvm check --help-all' explains the words\n");
 }
 
 nlohmann::json json_of(const Spread& s) { return {{"least", s.least}, {"middle", s.middle}, {"most", s.most}}; }
@@ -374,35 +459,42 @@ void print_json(const Report& report, const Judgement& j) {
                           {"normals", f.normals},
                           {"texcoords", f.texcoords},
                           {"texture", {f.texture_width, f.texture_height}},
+                          {"farthest_mm", f.farthest},
+                          {"odd", f.odd},
                           {"repeats", f.repeats}});
-    fmt::print("{}\n", nlohmann::json{{"frames", frames},
-                                      {"fps", report.fps},
-                                      {"unit_mm", report.millimetres_per_unit},
-                                      {"global_shift_mm", report.shift},
-                                      {"bad_frames", j.bad},
-                                      {"missing_frames", j.missing},
-                                      {"repeated_frames", j.repeated},
-                                      {"vertices", json_of(j.vertices)},
-                                      {"triangles", json_of(j.triangles)},
-                                      {"height_mm", json_of(j.height)},
-                                      {"border_mm", json_of(j.border)},
-                                      {"doubled_share", j.doubled},
-                                      {"turned_share", j.turned},
-                                      {"area_flicker", j.area_flicker},
-                                      {"light_flicker", j.light_flicker},
-                                      {"trial",
-                                       {{"frames", report.trial.frames},
-                                        {"mbit_per_second", report.trial.megabits_per_second},
-                                        {"intra_frames", report.trial.intra},
-                                        {"patched_frames", report.trial.patched}}},
-                                      {"advice", j.advice}}
-                           .dump(2));
+    fmt::print("{}\n",
+               nlohmann::json{{"frames", frames},
+                              {"fps", report.fps},
+                              {"unit_mm", report.millimetres_per_unit},
+                              {"global_shift_mm", report.shift},
+                              {"bad_frames", j.bad},
+                              {"missing_frames", j.missing},
+                              {"repeated_frames", j.repeated},
+                              {"odd_frames", j.odd},
+                              {"vertices", json_of(j.vertices)},
+                              {"triangles", json_of(j.triangles)},
+                              {"height_mm", json_of(j.height)},
+                              {"border_mm", json_of(j.border)},
+                              {"doubled_share", j.doubled},
+                              {"turned_share", j.turned},
+                              {"area_flicker", j.area_flicker},
+                              {"light_flicker", j.light_flicker},
+                              {"trial",
+                               {{"frames", report.trial.frames},
+                                {"mbit_per_second", report.trial.megabits_per_second},
+                                {"intra_frames", report.trial.intra},
+                                {"patched_frames", report.trial.patched}}},
+                              {"lacks_images",
+                               report.lacks_images.empty() ? nlohmann::json() : nlohmann::json(report.lacks_images)},
+                              {"advice", j.advice}}
+                   .dump(2));
 }
 
 Result<void> check(const Options& options) {
     watch_for_interruption();
-    const auto report = look_at_all(options);
+    auto report = look_at_all(options);
     if (!report) return tl::unexpected(report.error());
+    find_odd_frames(*report);
     if (report->frames.empty()) return fail(ErrorKind::bad_input, "there are no frames to check");
     const auto judgement = judge(*report);
     if (options.json)
@@ -414,20 +506,44 @@ Result<void> check(const Options& options) {
                 fmt::format("{} of {} cannot be encoded", judgement.bad, counted(report->frames.size(), "frame")));
 }
 
+constexpr const char* words_of_the_report =
+    "The words of the report:\n"
+    "  a range in brackets   the least and the most that a frame has, beside the middle one of all frames\n"
+    "  size                  of the largest piece; edges: the mean of their lengths\n"
+    "  pieces, specks        triangles that hang together; those of less than a hundredth of the largest one's area\n"
+    "  far away              pieces that float farther from the largest one than a tenth of its size\n"
+    "  border                how long the edges are in all that only one triangle has: the rims of holes and of open\n"
+    "                        surfaces; a closed body has none\n"
+    "  winding, turned       in which order triangles name their corners, which tells their outside; those that are\n"
+    "                        wound the other way round than their neighbours\n"
+    "  doubled               triangles that are there twice, as of surfaces with two sides\n"
+    "  flicker               by how much the surface's area and brightness change from frame to frame, the middle one "
+    "of\n"
+    "                        all changes\n"
+    "  I-, TP-frames         of those encoded on trial: coded by themselves, and tracked with a part sent anew\n"
+    "  bad, odd              frames that encode refuses; and those that it takes, but that are in another unit, far "
+    "darker\n"
+    "                        or brighter than the others, or have a vertex far away\n";
+
 }  // namespace
 
 void add_check(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("check", "Look a capture over before it is encoded, and say what to mend");
     add_capture_options(*command, options->capture);
+    options->capture.tells_odd_sizes = false;  // the report does
     command->add_option("--trial", options->trial,
                         "Encode so many frames with the defaults to see what they take; 0: none (default: 20)");
     command->add_flag("--json", options->json, "Print the report as JSON on standard output, with every frame");
-    command->footer(
+    constexpr const char* examples =
         "Exits with 0 if encode would take every frame, otherwise with 1.\n"
         "Examples:\n"
         "  htvm check capture/\n"
-        "  htvm check 'scan_*.ply' --json | jq .advice");
+        "  htvm check 'scan_*.ply' --json | jq .advice";
+    command->footer(std::string(words_of_the_report) + examples);
+    add_front_page(*command,
+                   {{{"--frames"}, {"--first"}, {"--ignore"}, {"--unit"}, {"--texture"}, {"--trial"}, {"--json"}},
+                    std::string("--help-all explains the words of the report.\n") + examples});
     command->callback([options, &run] { run = [options] { return check(*options); }; });
 }
 

@@ -100,13 +100,17 @@ RenderOptions render_options(const PictureOptions& options, const TexturedMesh& 
     return out;
 }
 
+UpAxis likely_up(const Mesh& first) {
+    const Box box = bounding_box(first);
+    const Point3 extent = box.high - box.low;
+    return extent[2] > extent[1] ? UpAxis::plus_z : UpAxis::plus_y;
+}
+
 ViewOptions upright_views(const PictureOptions& options, const MeshSource& source, const Mesh& mesh) {
     ViewOptions out = options.views;
     if (out.up == UpAxis::unknown) out.up = source.up;
     if (out.up != UpAxis::unknown) return out;
-    const Box box = bounding_box(mesh);
-    const Point3 extent = box.high - box.low;
-    out.up = extent[2] > extent[1] ? UpAxis::plus_z : UpAxis::plus_y;
+    out.up = likely_up(mesh);
     if (out.up == UpAxis::plus_z) note("the first mesh is longer along z than along y: z is taken for up (see --up)");
     return out;
 }

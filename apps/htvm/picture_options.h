@@ -48,6 +48,10 @@ void add_picture_options(CLI::App& command, PictureOptions& options);
 // How this mesh is drawn: coloured ones unlit unless told otherwise, as captured colours contain the light.
 RenderOptions render_options(const PictureOptions& options, const TexturedMesh& mesh);
 
+// Where the head is, as far as the first mesh of a sequence tells it: z if it is longer along that than along y, else
+// y.
+UpAxis likely_up(const Mesh& first);
+
 // The views with an axis that is up: the option's, else the source's, else y or z, along which the mesh is longer.
 ViewOptions upright_views(const PictureOptions& options, const MeshSource& source, const Mesh& mesh);
 

@@ -19,6 +19,8 @@
 #include "io/recording.h"
 #include "live/server/player_files.h"
 #include "live/server/server.h"
+#include "picture_options.h"
+#include "sequences.h"
 
 namespace htvm::app {
 namespace {
@@ -133,6 +135,19 @@ std::string check_orbit(const std::string& text) {
     return fits ? "" : "give degrees to the right and, if you like, degrees up and a distance above 0";
 }
 
+// Where the head is, as the player's attribute, where the stream does not say it and the player's y is wrong: by the
+// first mesh, as htvm still judges it, whichever frame is shown first. Empty: nothing is to be said.
+std::string up_of(const std::string& stream) {
+    auto source = open_meshes({stream}, {});
+    if (!source || source->frames == 0 || source->up != UpAxis::unknown) return {};
+    const auto first = source->mesh_at(*source, 0);
+    return first && likely_up(first->mesh) == UpAxis::plus_z ? "z" : "";
+}
+
+void add_to(std::string& query, const char* name, const std::string& value) {
+    if (!value.empty()) query += fmt::format("{}{}={}", query.empty() ? "?" : "&", name, percent_encoded(value));
+}
+
 Result<void> play(const PlayOptions& options) {
     if (!live::has_player())
         return fail(ErrorKind::unsupported,
@@ -162,11 +177,11 @@ Result<void> play(const PlayOptions& options) {
         const auto stream = stream_of({options.beside}, encoding, beside_temporary);
         if (!stream) return tl::unexpected(stream.error());
         server.files.push_back({"beside/" + stream->filename().string(), stream->string()});
-        query = fmt::format("?file={}&beside={}", percent_encoded(server.files[0].name),
-                            percent_encoded(server.files[1].name));
+        add_to(query, "file", server.files[0].name);
+        add_to(query, "beside", server.files[1].name);
     }
-    if (!options.orbit.empty())
-        query += fmt::format("{}orbit={}", query.empty() ? "?" : "&", percent_encoded(options.orbit));
+    if (!server.files.empty()) add_to(query, "up", up_of(server.files[0].path));
+    add_to(query, "orbit", options.orbit);
     auto opened = live::Server::open(server);
     if (!opened) return tl::unexpected(opened.error());
     const auto url = fmt::format("http://127.0.0.1:{}/{}", opened->port(), query);

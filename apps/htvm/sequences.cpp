@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -200,11 +203,13 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
                 return tl::unexpected(ok.error());
             if (!textured) return textured;
         }
-        auto& [mesh, texture, file] = *textured;
         for (const auto& [about, text, is_loss] : textures.findings().remarks)
             if (is_loss && told.insert(about).second)
                 warn(fmt::format("{}: {}", meshes.paths[position].string(), text));
-        if (texture) mesh.colours = colours_from_texture(mesh, *texture);
+        if (textured->texture) {
+            auto shown = colours_with_texture(*textured);
+            textured->tints = std::exchange(textured->mesh.colours, std::move(shown));
+        }
         return textured;
     };
     return source;
@@ -221,7 +226,54 @@ std::optional<std::size_t> place_of(std::span<const std::uint64_t> ascending, st
     return static_cast<std::size_t>(at - ascending.begin());
 }
 
+// As `htvm decode` numbers its files.
+bool counts_from_0(const MeshSource& source) {
+    return !source.numbers.empty() && source.numbers.front() == 0 && source.numbers.back() + 1 == source.frames;
+}
+
+// The microseconds that all times of a regular sequence are multiples of: the shortest interval, as exact as all of
+// them together say it. Nothing if they are not regular, to the microsecond that each is rounded to.
+std::optional<double> frame_interval(std::span<const std::int64_t> times) {
+    std::int64_t shortest = std::numeric_limits<std::int64_t>::max();
+    for (std::size_t k = 1; k < times.size(); ++k) shortest = std::min(shortest, times[k] - times[k - 1]);
+    if (times.size() < 2 || shortest < 1) return std::nullopt;
+    std::int64_t frames = 0;
+    for (std::size_t k = 1; k < times.size(); ++k) {
+        const std::int64_t interval = times[k] - times[k - 1], of_these = (interval + shortest / 2) / shortest;
+        if (std::abs(interval - of_these * shortest) > of_these + 1) return std::nullopt;
+        frames += of_these;
+    }
+    return static_cast<double>(times.back() - times.front()) / static_cast<double>(frames);
+}
+
+// When originals were captured that do not tell it: by their numbers, at the rate of the decoded ones.
+std::vector<std::int64_t> times_at_rate_of(const MeshSource& original, std::span<const std::int64_t> decoded) {
+    std::vector<std::int64_t> out;
+    const auto interval = frame_interval(decoded);
+    if (!interval) return out;
+    for (const auto place : places_in_time({std::vector<std::filesystem::path>(original.frames), original.numbers}))
+        out.push_back(std::llround(static_cast<double>(place) * *interval));
+    return out;
+}
+
 }  // namespace
+
+std::vector<FramePair> pair_files(const MeshSource& original, const MeshSource& decoded) {
+    auto by_number = pair_by_number(original.numbers, decoded.numbers);
+    const auto serves = [&](const std::vector<FramePair>& pairs) {
+        return !pairs.empty() && pairs.size() >= by_number.size();
+    };
+    if (auto pairs = pair_by_time(original.times_us, decoded.times_us); serves(pairs)) return pairs;
+    // Numbers with gaps are those of the originals.
+    if (!counts_from_0(decoded)) return by_number;
+    auto pairs = pair_by_time(times_at_rate_of(original, decoded.times_us), decoded.times_us);
+    return serves(pairs) ? pairs : by_number;
+}
+
+bool may_be_out_of_step(const MeshSource& original, const MeshSource& decoded) {
+    const bool are_files = !original.is_stream && !decoded.is_stream;
+    return are_files && decoded.times_us.empty() && counts_from_0(decoded) && decoded.frames < original.frames;
+}
 
 std::vector<FramePair> pair_by_number(std::span<const std::uint64_t> original, std::span<const std::uint64_t> decoded) {
     std::vector<FramePair> best;

@@ -67,6 +67,15 @@ std::vector<FramePair> pair_by_number(std::span<const std::uint64_t> original, s
 // Times ascend on both sides, in microseconds: frames within half a millisecond of each other are pairs.
 std::vector<FramePair> pair_by_time(std::span<const std::int64_t> original, std::span<const std::int64_t> decoded);
 
+// Pairs files on both sides: by time where both tell it, or where the decoded ones do, as htvm decode writes and
+// numbers them, and are regular: then the originals' numbers give theirs, at the shortest interval of the decoded ones.
+// By number where that pairs more.
+std::vector<FramePair> pair_files(const MeshSource& original, const MeshSource& decoded);
+
+// Whether frames that were left out while encoding would go unnoticed: fewer decoded files than originals, which count
+// from 0 without a gap, as `htvm decode` numbers them, and tell no times.
+bool may_be_out_of_step(const MeshSource& original, const MeshSource& decoded);
+
 // "frame 3", "frames 3, 5 to 9": the positions 0..count-1 that are not in `paired` (ascending), each given by its
 // number; empty if all are.
 std::string frames_left_out(std::span<const std::uint64_t> numbers, std::span<const std::size_t> paired);

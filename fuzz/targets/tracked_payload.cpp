@@ -80,6 +80,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     auto reference = make_node_reference(mesh, 1 + static_cast<std::int32_t>(input.below(2000)), 16);
     require(reference.has_value(), "any mesh can be a reference");
     reference->captured = {any_count(input), any_count(input)};
+    if (reference->captured.triangles % 2 == 1) {
+        reference->has_presence = true;
+        reference->around = vertices_around(mesh.positions.size(), mesh.triangles);
+        if (reference->captured.vertices % 2 == 1) reference->presence.resize(mesh.positions.size());
+    }
     DecodedTrackedFrame last, next;
     const TrackedState* before = nullptr;
     for (int frame = 0; frame < 4; ++frame) {
@@ -92,6 +97,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                     next.normals.size() == mesh.normals.size(),
                 "the reference's counts and attributes");
         require(fuzz::all_on_lattice(next.positions), "positions are on the lattice");
+        require(next.state.presence.size() == (reference->has_presence ? mesh.positions.size() : 0),
+                "presence of each vertex, where it is told");
         require(next.shares.total() <= payload.size(), "shares of what there is");
         std::swap(last, next);
         before = &last.state;

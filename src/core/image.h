@@ -21,8 +21,9 @@ struct TexturedMesh {
     TexturedMesh() = default;
     TexturedMesh(Mesh own, std::shared_ptr<const Image> image = nullptr)
         : mesh(std::move(own)), texture(std::move(image)) {}
-    Mesh mesh;                                                      // with texture coordinates, if there is a texture
-    std::shared_ptr<const Image> texture;                           // null: none; frames may share it
+    Mesh mesh;                             // with texture coordinates, if there is a texture
+    std::shared_ptr<const Image> texture;  // null: none; frames may share it
+    std::vector<Colour> tints;             // of the vertices, which multiply the texture in light; empty: none
     std::shared_ptr<const std::vector<std::uint8_t>> texture_file;  // the image's file, where it is to be kept as it is
 };
 

@@ -7,6 +7,7 @@
 #include "io/gltf_uri.h"
 #include "io/mesh_check.h"
 #include "io/mesh_file.h"
+#include "io/named_file.h"
 #include "io/skeleton_json_value.h"
 
 namespace htvm::internal {
@@ -80,12 +81,10 @@ Result<fs::path> file_in(const fs::path& folder, const std::string& uri) {
     if (folder.empty()) return refused("is a file of its own, which is not read here");
     const auto name = name_in_uri(uri, folder);
     if (!name || name->starts_with('/')) return refused("is not in its folder; only buffers there are read");
-    std::error_code error;
-    const auto inside = fs::canonical(folder, error);
-    const auto path = error ? fs::path() : fs::canonical(folder / *name, error);
-    if (error || !fs::is_regular_file(path, error)) return refused("is not there");
-    if (std::mismatch(inside.begin(), inside.end(), path.begin(), path.end()).first != inside.end())
-        return refused("is not in its folder; only buffers there are read");
+    const auto path = folder / *name;
+    const auto place = named_place(folder, path);
+    if (place == NamedPlace::nowhere) return refused("is not there");
+    if (place == NamedPlace::outside) return refused("is not in its folder; only buffers there are read");
     return path;
 }
 

@@ -72,6 +72,17 @@ std::vector<std::string> ways_to_read(const std::string& name) {
 
 }  // namespace
 
+NamedPlace named_place(const fs::path& folder, const fs::path& path) {
+    std::error_code error;
+    // A name that is too long for the system is an error, and no file.
+    if (!fs::is_regular_file(path, error)) return NamedPlace::nowhere;
+    const auto within = fs::canonical(folder, error);
+    const auto file = error ? fs::path() : fs::canonical(path, error);
+    if (error) return NamedPlace::nowhere;
+    const bool is_inside = std::mismatch(within.begin(), within.end(), file.begin(), file.end()).first == within.end();
+    return is_inside ? NamedPlace::inside : NamedPlace::outside;
+}
+
 const NamedFiles::Listing& NamedFiles::names_in(const fs::path& folder) {
     const auto [at, is_new] = listings_.try_emplace(folder);
     if (!is_new) return at->second;
@@ -101,23 +112,14 @@ std::optional<fs::path> NamedFiles::find_in_either_case(const fs::path& folder, 
 }
 
 std::optional<fs::path> NamedFiles::find(const fs::path& folder, const std::string& name) {
-    std::error_code error;
-    const auto inside = fs::canonical(folder, error);
-    if (error) return std::nullopt;
-    // A name that is too long for the system is an error, and no file.
-    const auto is_file_inside = [&](const fs::path& tried) {
-        if (!fs::is_regular_file(tried, error)) return false;
-        const auto path = fs::canonical(tried, error);
-        return !error && std::mismatch(inside.begin(), inside.end(), path.begin(), path.end()).first == inside.end();
-    };
     constexpr std::size_t longest = 4096;
     if (name.size() > longest) return std::nullopt;
     const auto ways = ways_to_read(name);
     for (const auto& way : ways)
-        if (is_file_inside(folder / way)) return folder / way;
+        if (named_place(folder, folder / way) == NamedPlace::inside) return folder / way;
     for (const auto& way : ways) {
         const auto tried = find_in_either_case(folder, way);
-        if (tried && is_file_inside(*tried)) return tried;
+        if (tried && named_place(folder, *tried) == NamedPlace::inside) return tried;
     }
     return std::nullopt;
 }

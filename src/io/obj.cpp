@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <iterator>
+#include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "core/equal_floats.h"
 #include "io/finite_mesh.h"
 #include "io/number_text.h"
 #include "io/obj_line.h"
@@ -20,27 +21,6 @@ namespace htvm {
 
 namespace {
 
-// For each value, the index of the first that equals it. With these, equal values under several indices (many exporters
-// write one per corner) do not split vertices.
-template <std::size_t N>
-std::vector<std::uint32_t> first_equal(const std::vector<std::array<float, N>>& values) {
-    struct Hash {
-        std::size_t operator()(const std::array<float, N>& value) const {
-            std::uint64_t h = 0;
-            for (const float c : value) h = (h ^ std::bit_cast<std::uint32_t>(c + 0.0f)) * 0x9e3779b97f4a7c15u;
-            return static_cast<std::size_t>(h ^ (h >> 32));
-        }
-    };
-    std::unordered_map<std::array<float, N>, std::uint32_t, Hash> first;
-    first.reserve(values.size());
-    std::vector<std::uint32_t> out;
-    out.reserve(values.size());
-    for (const auto& value : values) {
-        out.push_back(first.emplace(value, static_cast<std::uint32_t>(out.size())).first->second);
-    }
-    return out;
-}
-
 // True if every corner uses the attribute with the same index as its position, and the counts agree: then the attribute
 // is one per position, also for positions that no corner uses.
 bool in_step(const ObjText& obj, std::size_t count, std::uint32_t ObjCorner::*attribute) {
@@ -50,8 +30,9 @@ bool in_step(const ObjText& obj, std::size_t count, std::uint32_t ObjCorner::*at
 
 // Assigns a vertex to every corner; `vertices` tells which combination each vertex is.
 std::vector<std::uint32_t> vertices_of_corners(const ObjText& obj, std::vector<ObjCorner>& vertices) {
-    const auto texcoord_of = first_equal(obj.texcoords);
-    const auto normal_of = first_equal(obj.normals);
+    // Equal values under several indices, as many exporters write one per corner, do not split vertices.
+    const auto texcoord_of = internal::first_equal(std::span(obj.texcoords));
+    const auto normal_of = internal::first_equal(std::span(obj.normals));
     vertices.assign(obj.positions.size(), ObjCorner{});
     std::vector<std::uint32_t> vertex_of_corner;
     vertex_of_corner.reserve(obj.corners.size());

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/letter_case.h"
+#include "io/named_file.h"
 #include "io/sequence.h"
 #include "io/skeleton_json_value.h"
 
@@ -138,15 +139,9 @@ Result<void> add_universal_texture(const json& manifest, const fs::path& folder,
 
 std::optional<fs::path> recorded_file(const fs::path& folder, std::string name) {
     std::replace(name.begin(), name.end(), '\\', '/');
-    std::error_code error;
-    const auto inside = fs::canonical(folder, error);
-    if (error || name.find('\0') != name.npos) return std::nullopt;
+    if (name.find('\0') != name.npos) return std::nullopt;
     while (!name.empty()) {
-        if (const auto path = fs::canonical(folder / name, error); !error && fs::is_regular_file(path, error)) {
-            const bool is_inside =
-                std::mismatch(inside.begin(), inside.end(), path.begin(), path.end()).first == inside.end();
-            if (is_inside) return folder / name;
-        }
+        if (named_place(folder, folder / name) == NamedPlace::inside) return folder / name;
         const auto slash = name.find('/');
         if (slash == name.npos) break;
         name.erase(0, slash + 1);

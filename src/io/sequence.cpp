@@ -273,18 +273,56 @@ struct FolderOfMeshes {
     std::vector<std::string> meshes;  // at least one
 };
 
-// The only name that is in all; nothing if there is none or more than one.
-std::optional<std::string> name_in_all(const std::vector<FolderOfMeshes>& folders) {
+// The names that are in all.
+std::vector<std::string> names_in_all(const std::vector<FolderOfMeshes>& folders) {
     std::map<std::string, std::size_t> count;
     for (const auto& folder : folders)
         for (const auto& mesh : folder.meshes) ++count[mesh];
-    std::optional<std::string> out;
-    for (const auto& [name, of] : count) {
-        if (of < folders.size()) continue;
-        if (out) return std::nullopt;
-        out = name;
-    }
+    std::vector<std::string> out;
+    for (const auto& [name, of] : count)
+        if (of == folders.size()) out.push_back(name);
     return out;
+}
+
+// What leaves one mesh in each folder, by a pattern for --ignore: all but one of the names that each has, or of the
+// kinds of names of which each has one. Nothing if none does, as where each folder is a capture.
+std::vector<std::string> patterns_to_ignore(const std::vector<FolderOfMeshes>& folders) {
+    constexpr std::size_t most = 4;  // meshes of a frame: more are a capture
+    std::vector<std::string> all;
+    for (const auto& folder : folders) {
+        if (folder.meshes.size() > most) return {};
+        all.insert(all.end(), folder.meshes.begin(), folder.meshes.end());
+    }
+    auto out = names_in_all(folders);
+    if (out.size() * folders.size() != all.size()) {
+        out.clear();
+        for (const auto& kind : kinds_of_names(all, "")) {
+            if (kind.places.size() != folders.size()) return {};
+            auto pattern = kind.pattern;
+            if (const auto number = pattern.find("%d"); number != pattern.npos) pattern.replace(number, 2, "*");
+            out.push_back(std::move(pattern));
+        }
+    }
+    if (!out.empty()) out.erase(out.begin());
+    return out;
+}
+
+Error too_many_in_folders(const fs::path& parent, const std::vector<FolderOfMeshes>& folders) {
+    std::vector<std::string> found;
+    for (const auto& folder : folders)
+        found.push_back(folder.name + " with " + std::to_string(folder.meshes.size()) + " (" + listed(folder.meshes) +
+                        ")");
+    std::string out = parent.string() + " holds no mesh files but folders of some: " + listed(found);
+    const auto ignored = folders.size() > 1 ? patterns_to_ignore(folders) : std::vector<std::string>();
+    if (ignored.empty()) {
+        out += "; name one of them, such as " + (parent / folders[0].name).string() +
+               "; of folders for a frame each, each must hold one mesh";
+    } else {
+        out += "; of folders for a frame each, each must hold one mesh: leave the others out with";
+        for (const auto& pattern : ignored) out += " --ignore \"" + pattern + "\"";
+        out += "; or name one of them, such as " + (parent / folders[0].name).string();
+    }
+    return {ErrorKind::bad_input, std::move(out)};
 }
 
 // The frames of a folder without meshes; nothing if its folders have none either.
@@ -304,17 +342,9 @@ Result<std::optional<SequenceFiles>> sequence_of_folders(const fs::path& parent,
     }
     if (folders.empty()) return std::optional<SequenceFiles>{};
     std::vector<MeshRemark> remarks;
-    const auto common = one_each || folders.size() == 1 ? std::nullopt : name_in_all(folders);
-    if (!one_each && !common) {
-        std::vector<std::string> found;
-        for (const auto& folder : folders)
-            found.push_back(folder.name + " with " + std::to_string(folder.meshes.size()) + " (" +
-                            listed(folder.meshes) + ")");
-        return fail(ErrorKind::bad_input, parent.string() +
-                                              " holds no mesh files but folders of some: " + listed(found) +
-                                              "; name one of them, such as " + (parent / folders[0].name).string() +
-                                              "; of folders for a frame each, each must hold one mesh");
-    }
+    const auto in_all = one_each || folders.size() == 1 ? std::vector<std::string>() : names_in_all(folders);
+    const auto common = in_all.size() == 1 ? std::optional(in_all[0]) : std::nullopt;
+    if (!one_each && !common) return tl::unexpected(too_many_in_folders(parent, folders));
     if (common)
         remarks.push_back(
             {"mesh-of-several", "of the meshes in each folder " + *common + " is taken, which all have", true});
@@ -324,6 +354,19 @@ Result<std::optional<SequenceFiles>> sequence_of_folders(const fs::path& parent,
     auto files = sequence_of(std::move(entries), parent, std::move(remarks));
     if (!files) return tl::unexpected(files.error());
     return std::optional(std::move(*files));
+}
+
+// A folder two levels below that holds meshes, for messages; the first by name.
+std::optional<fs::path> folder_of_meshes_below(const fs::path& top, const SequenceOptions& options) {
+    const auto folders = names_in(top, true, options);
+    for (const auto& name : folders ? *folders : std::vector<std::string>{}) {
+        const auto inner = names_in(top / name, true, options);
+        for (const auto& deeper : inner ? *inner : std::vector<std::string>{}) {
+            const auto names = names_in(top / name / deeper, false, options);
+            if (names && !meshes_among(*names).empty()) return top / name / deeper;
+        }
+    }
+    return std::nullopt;
 }
 
 // ---- What was named -------------------------------------------------------------------------------------------------
@@ -337,8 +380,10 @@ Result<SequenceFiles> files_of_folder(const fs::path& folder, const SequenceOpti
     auto in_folders = sequence_of_folders(folder, options);
     if (!in_folders) return tl::unexpected(in_folders.error());
     if (*in_folders) return std::move(**in_folders);
+    const auto deeper = folder_of_meshes_below(folder, options);
     return fail(ErrorKind::bad_input, "no mesh files (" + std::string(mesh_file_extensions) +
-                                          ") were found: " + what_is_there(folder, *names, options));
+                                          ") were found: " + what_is_there(folder, *names, options) +
+                                          (deeper ? "; but " + deeper->string() + " holds some: name that" : ""));
 }
 
 Result<SequenceFiles> files_of_pattern(const fs::path& folder, const NumberedName& pattern, std::string_view what,

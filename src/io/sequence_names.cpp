@@ -293,7 +293,12 @@ Result<void> refuse_several_of_each(const NumberedNames& all, std::size_t main) 
     std::string list;
     for (const auto& [pattern, count] : sets)
         list += (list.empty() ? "" : ", ") + std::to_string(count) + " \"" + pattern + "\"";
-    return fail(ErrorKind::bad_input, "there are several files of each number: " + list + "; name those of one kind");
+    // One of a kind that is not the largest.
+    const auto largest =
+        std::max_element(sets.begin(), sets.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    const auto& other = largest == sets.begin() ? std::next(sets.begin())->first : sets.begin()->first;
+    return fail(ErrorKind::bad_input, "there are several files of each number: " + list +
+                                          "; leave out all but one kind, as with --ignore \"" + other + "\"");
 }
 
 // The order of names in which no number counts the frames.

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
-#include <unordered_map>
 
+#include "core/equal_floats.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/srgb.h"
@@ -101,21 +100,13 @@ ColourSum multiplied(ColourSum sum, const Colour& by) {
     return sum;
 }
 
-// Where a vertex is and how it is turned: those that agree in both are one.
-struct Place {
-    Vector3f position, normal;
-    bool operator==(const Place&) const = default;
-};
-
-struct PlaceHash {
-    std::size_t operator()(const Place& place) const {
-        std::uint64_t h = 0;
-        for (const auto* values : {&place.position, &place.normal})
-            for (const float c : *values)
-                h = std::rotl((h ^ std::bit_cast<std::uint32_t>(c + 0.0f)) * 0x9e3779b97f4a7c15u, 29);
-        return static_cast<std::size_t>(h ^ (h >> 32));
-    }
-};
+// The sums of all vertices, multiplied by the colours that these have.
+std::vector<ColourSum> sums_with_own_colours(const TexturedMesh& captured, Threads threads, double spacing) {
+    auto out = sums_of_vertices(captured.mesh, *captured.texture, threads, spacing);
+    const auto& colours = captured.mesh.colours;
+    for (std::size_t v = 0; v < colours.size(); ++v) out[v] = multiplied(out[v], colours[v]);
+    return out;
+}
 
 }  // namespace
 
@@ -126,27 +117,35 @@ std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, T
     return out;
 }
 
+std::vector<Colour> colours_with_texture(const TexturedMesh& captured, Threads threads) {
+    std::vector<Colour> out;
+    out.reserve(captured.mesh.positions.size());
+    for (const auto& sum : sums_with_own_colours(captured, threads, 1)) out.push_back(mean_of(sum));
+    return out;
+}
+
 Mesh with_vertex_colours(const TexturedMesh& captured, Threads threads, double spacing) {
     const Mesh& mesh = captured.mesh;
-    const auto sums = sums_of_vertices(mesh, *captured.texture, threads, spacing);
+    const auto sums = sums_with_own_colours(captured, threads, spacing);
     Mesh out;
     std::vector<ColourSum> merged;
     std::vector<std::uint32_t> new_of(mesh.positions.size());
-    std::unordered_map<Place, std::uint32_t, PlaceHash> known;
+    FloatsTable<6> known;  // by where a vertex is and how it is turned: those that agree in both are one
     known.reserve(mesh.positions.size());
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-        const Place place{mesh.positions[v], mesh.normals.empty() ? Vector3f{} : mesh.normals[v]};
-        const auto [at, is_new] = known.emplace(place, static_cast<std::uint32_t>(merged.size()));
+        const auto& p = mesh.positions[v];
+        const auto n = mesh.normals.empty() ? Vector3f{} : mesh.normals[v];
+        const auto [at, is_new] =
+            known.emplace(std::array{p[0], p[1], p[2], n[0], n[1], n[2]}, static_cast<std::uint32_t>(merged.size()));
         new_of[v] = at->second;
         if (is_new) {
-            out.positions.push_back(place.position);
-            if (!mesh.normals.empty()) out.normals.push_back(place.normal);
+            out.positions.push_back(p);
+            if (!mesh.normals.empty()) out.normals.push_back(n);
             merged.emplace_back();
         }
-        const ColourSum own = mesh.colours.empty() ? sums[v] : multiplied(sums[v], mesh.colours[v]);
         ColourSum& sum = merged[at->second];
-        sum.area += own.area;
-        for (std::size_t i = 0; i < 3; ++i) sum.colour[i] += own.colour[i];
+        sum.area += sums[v].area;
+        for (std::size_t i = 0; i < 3; ++i) sum.colour[i] += sums[v].colour[i];
     }
     for (const auto& sum : merged) out.colours.push_back(mean_of(sum));
     for (const Triangle& t : mesh.triangles) {

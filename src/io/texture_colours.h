@@ -15,6 +15,9 @@ namespace htvm {
 // colour at its own coordinates. The mesh must have texture coordinates, and the image pixels.
 std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, internal::Threads threads = {});
 
+// The same of a mesh as texture_file.h reads it, multiplied, in light, by the colours that its vertices have.
+std::vector<Colour> colours_with_texture(const TexturedMesh& captured, internal::Threads threads = {});
+
 // The mesh with these colours in place of the texture and its coordinates, multiplied, in light, by those that its
 // vertices have, as glTF means both together; where they are not meant so, texture_file.h leaves them out. Vertices at
 // one place, of which a seam of the texture needs one for each side, become one if their normals agree, with the mean

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -26,6 +27,25 @@ constexpr Colour white{255, 255, 255};
 
 tl::unexpected<Error> fail_at(const fs::path& mesh, ErrorKind kind, const std::string& message) {
     return fail(kind, mesh.empty() ? message : mesh.string() + ": " + message);
+}
+
+// What names an image, of several: "of its material "skin"", or "of its part 2 of 3".
+std::string who_wears(std::size_t image, const TextureReference& texture, const std::vector<bool>& worn) {
+    for (std::size_t p = 0; p < worn.size(); ++p) {
+        if (!worn[p] || texture.parts[p].image != image) continue;
+        const auto& material = texture.parts[p].material;
+        return material.empty() ? "of its part " + std::to_string(p + 1) + " of " + std::to_string(worn.size())
+                                : "of its material \"" + material.substr(0, 200) + "\"";
+    }
+    return "of its parts";
+}
+
+// The images that parts show, each once.
+std::size_t images_of(const TextureReference& texture, const std::vector<bool>& worn) {
+    std::set<std::size_t> out;
+    for (std::size_t p = 0; p < worn.size(); ++p)
+        if (worn[p] && texture.parts[p].image) out.insert(*texture.parts[p].image);
+    return out.size();
 }
 
 fs::path folder_of(const fs::path& mesh) { return mesh.has_parent_path() ? mesh.parent_path() : fs::path("."); }
@@ -201,6 +221,19 @@ void TextureFiles::take_parts(const Mesh& mesh, const fs::path& path) {
     take_materials(findings_, folder_of(path), worn_parts(mesh, findings_.texture), is_needed, named_);
 }
 
+// Tells where parts have images of their own, in place of which the user names one.
+void TextureFiles::remark_on_one_for_all(const Mesh& mesh, const fs::path& path) {
+    const auto worn = worn_parts(mesh, findings_.texture);
+    if (std::ranges::count(worn, true) < 2) return;
+    auto own = findings_;
+    if (!path.empty()) take_materials(own, folder_of(path), worn, false, named_);
+    if (const auto images = images_of(own.texture, worn); images > 1)
+        remark(&findings_, "one-image-for-all",
+               "its parts have " + std::to_string(images) +
+                   " images of their own; the one of --texture stands in for all of them",
+               true);
+}
+
 Result<TextureFiles::Shown> TextureFiles::find(const Mesh& mesh, const fs::path& path, std::size_t place) {
     Shown out;
     if (options_.files == "none") return out;
@@ -235,9 +268,15 @@ Result<TextureFiles::Shown> TextureFiles::find_of_parts(const std::vector<bool>&
             continue;
         }
         const auto file = named_.find(folder_of(path), image.name);
-        if (!file)
-            return fail(ErrorKind::bad_input,
-                        "its image \"" + image.name.substr(0, 200) + "\" is not in its folder" + other_ways);
+        if (!file) {
+            const auto name = "its image \"" + image.name.substr(0, 200) + '"';
+            const auto images = images_of(texture, worn);
+            if (images < 2) return fail(ErrorKind::bad_input, name + " is not in its folder" + other_ways);
+            return fail(ErrorKind::bad_input, name + ", " + who_wears(i, texture, worn) +
+                                                  ", is not in its folder; its " + std::to_string(images) +
+                                                  " images belong there: --texture gives one "
+                                                  "in place of all of them, or none to go on without");
+        }
         out.images.push_back({file->string(), *file, nullptr, {}});
     }
     return out;
@@ -260,7 +299,10 @@ Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, st
         turn_over(mesh);
     if (mesh.positions.empty()) return TexturedMesh(std::move(mesh));
     const bool is_named = !images_.empty() || video_;
-    if (!is_named && options_.files != "none") take_parts(mesh, path);
+    if (is_named)
+        remark_on_one_for_all(mesh, path);
+    else if (options_.files != "none")
+        take_parts(mesh, path);
     if (mesh.texcoords.empty()) {
         if (is_named || use == TextureUse::always)
             return fail_at(path, ErrorKind::bad_input,

@@ -106,6 +106,7 @@ private:
     };
     Result<TexturedMesh> completed(Mesh mesh, const std::filesystem::path& path, std::size_t place, TextureUse use);
     void take_parts(const Mesh& mesh, const std::filesystem::path& path);
+    void remark_on_one_for_all(const Mesh& mesh, const std::filesystem::path& path);
     Result<Shown> find(const Mesh& mesh, const std::filesystem::path& path, std::size_t place);
     Result<Shown> find_of_parts(const std::vector<bool>& worn, const std::filesystem::path& path);
     TexturedMesh without_image(Mesh mesh);

@@ -1,16 +1,16 @@
 #include "metrics/mesh_facts.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "core/disjoint_sets.h"
+#include "core/equal_floats.h"
 #include "core/geometry.h"
 
 namespace htvm {
@@ -18,39 +18,6 @@ namespace htvm {
 using namespace internal;
 
 namespace {
-
-struct PlaceHash {
-    std::size_t operator()(const Vector3f& p) const {
-        std::uint64_t h = 0;
-        for (const float c : p) h = (h ^ std::bit_cast<std::uint32_t>(c + 0.0f)) * 0x9e3779b97f4a7c15u;
-        return static_cast<std::size_t>(h ^ (h >> 32));
-    }
-};
-
-// The first vertex at the place of each.
-std::vector<std::uint32_t> places_of(const Mesh& mesh) {
-    std::unordered_map<Vector3f, std::uint32_t, PlaceHash> known;
-    known.reserve(mesh.positions.size());
-    std::vector<std::uint32_t> out;
-    out.reserve(mesh.positions.size());
-    for (const auto& p : mesh.positions)
-        out.push_back(known.emplace(p, static_cast<std::uint32_t>(out.size())).first->second);
-    return out;
-}
-
-// Sets that are joined one pair after another.
-class JoinedSets {
-public:
-    explicit JoinedSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
-    std::uint32_t of(std::uint32_t a) {
-        while (parent_[a] != a) a = parent_[a] = parent_[parent_[a]];
-        return a;
-    }
-    void join(std::uint32_t a, std::uint32_t b) { parent_[of(a)] = of(b); }
-
-private:
-    std::vector<std::uint32_t> parent_;
-};
 
 struct Box {
     std::array<double, 3> low, high;
@@ -101,7 +68,7 @@ void count_edges(const Mesh& mesh, const std::vector<Triangle>& triangles, MeshF
 }
 
 void find_pieces(const Mesh& mesh, const std::vector<Triangle>& triangles, MeshFacts& out) {
-    JoinedSets sets(mesh.positions.size());
+    DisjointSets sets(mesh.positions.size());
     for (const auto& t : triangles) {
         sets.join(t[0], t[1]);
         sets.join(t[1], t[2]);
@@ -150,7 +117,7 @@ MeshFacts facts_of(const Mesh& mesh) {
     MeshFacts out;
     out.vertices = mesh.positions.size();
     out.triangles = mesh.triangles.size();
-    const auto place = places_of(mesh);
+    const auto place = first_equal(std::span(mesh.positions));
     std::vector<bool> used(mesh.positions.size());
     std::vector<Triangle> triangles;
     for (const auto& t : mesh.triangles) {

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "core/parallel.h"
+#include "core/srgb.h"
 
 namespace htvm {
 
@@ -70,6 +71,8 @@ struct TrianglePaint {
     const ImagePyramid* texture = nullptr;  // its colours are multiplied by the shades
     std::array<Vector2f, 3> texcoords;
     std::size_t level = 0;  // of the texture
+    bool tinted = false;
+    std::array<Shade, 3> tints;  // light by which the texture's is multiplied
 };
 
 // Texels along the side of a pixel, on average over the triangle.
@@ -92,6 +95,9 @@ TrianglePaint paint_of(const DrawableMesh& drawable, const Triangle& t, bool fro
         paint.texcoords = {mesh.texcoords[t[0]], mesh.texcoords[t[1]], mesh.texcoords[t[2]]};
         paint.level = paint.texture->level_for(texels_in_pixel(*paint.texture, paint.texcoords, pixels));
     }
+    paint.tinted = drawable.tints != nullptr;
+    for (std::size_t i = 0; i < 3 && paint.tinted; ++i)
+        for (std::size_t c = 0; c < 3; ++c) paint.tints[i][c] = light_of((*drawable.tints)[t[i]][c]);
     for (std::size_t i = 0; i < 3; ++i) {
         const Colour& c = coloured ? mesh.colours[t[i]] : options.material;
         if (drawable.texture)
@@ -115,6 +121,16 @@ TrianglePaint paint_of(const DrawableMesh& drawable, const Triangle& t, bool fro
 
 std::uint8_t level(float value) { return static_cast<std::uint8_t>(std::clamp(value + 0.5f, 0.0f, 255.0f)); }
 
+Shade tinted(const Shade& texel, const std::array<Shade, 3>& tints, const std::array<double, 3>& weights) {
+    Shade out;
+    for (std::size_t c = 0; c < 3; ++c) {
+        float tint = 0;
+        for (std::size_t i = 0; i < 3; ++i) tint += static_cast<float>(weights[i]) * tints[i][c];
+        out[c] = level_of(light_of(level(texel[c])) * tint);
+    }
+    return out;
+}
+
 void paint_pixel(const TrianglePaint& paint, const std::array<double, 3>& weights, const Light& light,
                  std::uint8_t* rgb) {
     float lit = 1;
@@ -131,6 +147,7 @@ void paint_pixel(const TrianglePaint& paint, const std::array<double, 3>& weight
         };
         texel = paint.texture->at(place(0), place(1), paint.level);
     }
+    if (paint.tinted) texel = tinted(texel, paint.tints, weights);
     for (std::size_t c = 0; c < 3; ++c) {
         float value = 0;
         for (std::size_t i = 0; i < 3; ++i) value += static_cast<float>(weights[i]) * paint.shades[i][c];
@@ -227,9 +244,10 @@ void clear(const Camera& camera, const Colour& background, Canvas& canvas) {
 }  // namespace
 
 DrawableMesh make_drawable(const ShownMesh& shown, const RenderOptions& options) {
-    DrawableMesh drawable{shown.mesh, options, {}, {}};
+    DrawableMesh drawable{shown.mesh, options, {}, {}, nullptr};
     if (options.shading == Shading::smooth) drawable.normals = welded_normals(*shown.mesh);
     if (options.colours && shown.texture && !shown.mesh->texcoords.empty()) drawable.texture.emplace(*shown.texture);
+    if (drawable.texture) drawable.tints = shown.tints;
     return drawable;
 }
 

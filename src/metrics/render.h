@@ -64,12 +64,15 @@ struct Picture {
     std::vector<std::uint8_t> covered;  // one byte per pixel: 1 if the mesh was drawn there (the foreground), else 0
 };
 
-// A mesh to draw, with its texture if it has one; both are lent.
+// A mesh to draw, with its texture if it has one, and the tints that multiply that; all are lent.
 struct ShownMesh {
     const Mesh* mesh;
     const Image* texture = nullptr;
+    const std::vector<Colour>* tints = nullptr;  // null: none
     ShownMesh(const Mesh& shown) : mesh(&shown) {}
-    ShownMesh(const TexturedMesh& shown) : mesh(&shown.mesh), texture(shown.texture.get()) {}
+    ShownMesh(const TexturedMesh& shown) : mesh(&shown.mesh), texture(shown.texture.get()) {
+        if (!shown.tints.empty()) tints = &shown.tints;
+    }
     bool has_colours() const { return texture || !mesh->colours.empty(); }
 };
 
@@ -83,6 +86,7 @@ struct DrawableMesh {
     RenderOptions options;
     std::vector<Vector3f> normals;                  // one per vertex, if smooth shading needs them
     std::optional<internal::ImagePyramid> texture;  // if it is drawn
+    const std::vector<Colour>* tints = nullptr;     // of the vertices, likewise
 };
 DrawableMesh make_drawable(const ShownMesh& shown, const RenderOptions& options = {});
 

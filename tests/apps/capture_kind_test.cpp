@@ -60,6 +60,56 @@ TEST(CaptureKind, TellsFramesOfAnotherSize) {
     EXPECT_EQ(kind.unlike(with_stray, {}, false), "") << "a flying vertex is no other size";
 }
 
+// Around the sizes that people have as they move.
+CaptureKind usual_kind() {
+    CaptureKind out;
+    for (const float size : {0.9f, 1.0f, 1.1f}) out.add(person(size), {}, false);
+    return out;
+}
+
+TEST(CaptureKind, TellsFramesInAnotherUnitThanTheirNeighbours) {
+    const auto kind = usual_kind();
+    EXPECT_THAT(kind.odd_size(person(2.54f)), HasSubstr("2.5 times larger than the other frames")) << "cm among inches";
+    EXPECT_THAT(kind.odd_size(person(1 / 3.28f)), HasSubstr("3.3 times smaller")) << "feet among metres";
+    EXPECT_THAT(kind.odd_size(person(1.8f)), "") << "people are no units";
+    EXPECT_EQ(kind.unlike(person(2.54f), {}, false), "") << "which may be meant so";
+    EXPECT_THAT(kind.unlike(person(9.9f), {}, false), HasSubstr("another unit")) << "decimetres among metres";
+}
+
+TEST(CaptureKind, TheUsualSizeIsNotThatOfTheFirstFrame) {
+    CaptureKind kind;
+    for (const float size : {0.1f, 1.0f, 1.1f}) kind.add(person(size), {}, false);
+    EXPECT_THAT(kind.unlike(person(0.1f), {}, false), HasSubstr("10 times smaller than the other frames"));
+    EXPECT_EQ(kind.unlike(person(1.05f), {}, false), "");
+}
+
+TEST(CaptureKind, ASizeThatEdgesDisagreeWithIsNoUnit) {
+    const auto kind = usual_kind();
+    auto two = person();  // a second person comes, three metres away
+    const auto more = person(1, 3000);
+    const auto count = static_cast<std::uint32_t>(two.positions.size());
+    two.positions.insert(two.positions.end(), more.positions.begin(), more.positions.end());
+    for (const auto& t : more.triangles) two.triangles.push_back({t[0] + count, t[1] + count, t[2] + count});
+    EXPECT_GT(size_of(two).reach, 2 * size_of(person()).reach);
+    EXPECT_EQ(kind.odd_size(two), "");
+    auto coarse = person(1);  // every third vertex, longer edges
+    coarse.triangles.clear();
+    for (std::uint32_t i = 12; i < 60; ++i) coarse.triangles.push_back({i - 12, i - 6, i});
+    EXPECT_GT(size_of(coarse).edge, 1.5 * size_of(person()).edge);
+    EXPECT_EQ(kind.odd_size(coarse), "");
+}
+
+TEST(MeshSize, ASpikeIsFarFromTheMiddleAndChangesNoneOfTheOthers) {
+    auto spiked = person();
+    spiked.positions[59] = {90000, 0, 0};
+    const auto size = size_of(spiked), plain = size_of(person());
+    EXPECT_NEAR(size.reach, plain.reach, 0.1 * plain.reach);
+    EXPECT_NEAR(size.edge, plain.edge, 0.1 * plain.edge);
+    EXPECT_NEAR(farthest_from(size.middle, spiked), 90000, 1000);
+    EXPECT_LT(farthest_from(plain.middle, person()), 1200);
+    EXPECT_EQ(farthest_from({}, {}), 0);
+}
+
 TEST(CaptureKind, AddsUpTheColoursOfFrames) {
     CaptureKind kind;
     EXPECT_EQ(kind.colour_range(), std::nullopt) << "types say it";

@@ -39,8 +39,13 @@ expect 0 "mesh 2 of standard input: it has no colours" bash -c "cat fading/*.ply
 
 # The second half is in another unit.
 change mixed 'v = [[c / 1000 for c in row[:3]] + row[3:] for row in v] if k > 2 else v'
-expect 1 "times smaller than the first frame: one of the two is of another capture, or in another unit" \
+expect 1 "frame_00003.ply: it is 1010 times smaller than the other frames: it is of another capture, or in another unit" \
     "$htvm" encode mixed -o x.htvm
+# A frame in inches among centimetres is told, and encoded.
+change inches 'v = [[c / 25.4 if k == 3 else c / 10 for c in row[:3]] + row[3:] for row in v]'
+expect 0 "warning: inches/frame_00003.ply: it is 2.6 times smaller than the other frames, in its extent and its edges alike" \
+    "$htvm" encode inches -o x.htvm
+"$htvm" encode capture -o x.htvm 2>&1 | grep "times" && fail "people who walk are of another size"
 
 # Far from the origin, as surveys are: what decode writes is where the capture is, to the lattice's step.
 change survey 'number = "double"; v = [[row[0] / 1000 + 500000, row[1] / 1000 + 80, row[2] / 1000 + 4649776] + row[3:] for row in v]'
@@ -67,6 +72,11 @@ for path, text in (("surveyed/00002.ply", False), ("surveyed_obj/00002.obj", Tru
     off = max(min(max(abs(a - b) for a, b in zip(p, q)) for q in original) for p in decoded[::40])
     assert off < 0.0004, off
 PYTHON
+# How tall it is is told of the doubles, not of floats that are exact to 30 mm there.
+heights() { "$htvm" encode "$@" --frames 1 -o x.htvm 2>&1 | grep -o "subject .* tall"; }
+change near 'number = "double"; v = [[row[0] / 1000, row[1] / 1000, row[2] / 1000] + row[3:] for row in v]'
+change farther 'number = "double"; v = [[row[0] / 1000 + 3e7, row[1] / 1000, row[2] / 1000 + 3e7] + row[3:] for row in v]'
+[ "$(heights near)" = "$(heights farther)" ] || fail "$(heights near) near, and $(heights farther) far away"
 expect 0 "M2" "$htvm" compare survey survey.htvm --unit m --only m2
 expect 0 "M2" "$htvm" compare survey surveyed --unit m --only m2
 
@@ -93,5 +103,18 @@ expect 0 "the first 2 frames with the defaults" "$htvm" check capture --trial 2
 mkdir gap && cp capture/frame_0000[0134].ply gap/
 expect 0 "1 frame is missing by the numbers in the names" "$htvm" check gap
 expect 1 "nowhere" "$htvm" check nowhere
+"$htvm" check capture | grep -qE "size +[0-9]+ \([0-9]+ to [0-9]+\) mm tall, edges" || fail "check says no range of sizes"
+expect 0 "htvm check --help-all' explains the words" "$htvm" check capture
+
+# Frames that are odd among the others, though encode takes them, are named; people who walk are not.
+"$htvm" check capture | grep -q "  odd" && fail "people who walk are odd: $("$htvm" check capture)"
+expect 0 "odd          inches/frame_00003.ply: it is 2.6 times smaller than the other frames" "$htvm" check inches
+expect 0 "1 frame is not like the others, as said above" "$htvm" check inches
+change dark 'v = [row[:3] + [0, 0, 0] for row in v] if k == 1 else v'
+expect 0 "odd          dark/frame_00001.ply: it is black: its brightness is 0 of 255" "$htvm" check dark
+change spiked 'v[7][0] += 20000 if k == 2 else 0'
+expect 0 "odd          spiked/frame_00002.ply: a vertex is 20" "$htvm" check spiked
+"$htvm" check inches --json | python3 -c 'import json, sys; r = json.load(sys.stdin); sys.exit(r["odd_frames"] != 1 or [bool(f["odd"]) for f in r["frames"]] != [False, False, False, True, False])' ||
+    fail "check --json does not say which frame is odd"
 
 done_with "what frames have in common is decided once"

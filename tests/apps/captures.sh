@@ -65,6 +65,15 @@ cp -r capture holey && echo nonsense >holey/frame_00003.ply
 [ "$(cut -d, -f1 whole.csv)" = "$(cut -d, -f1 holey.csv)" ] || fail "a frame that is left out moves others"
 awk -F, 'NR > 1 && $6 > 1 { exit 1 }' holey.csv || fail "frames are compared with others' originals"
 expect 0 "frame 3 of holey left out: holey.htvm has no such" "$htvm" compare holey holey.htvm --only m1
+# So are files that decode wrote, which it numbers without a gap: PLY files tell their times, OBJ files do not.
+"$htvm" decode holey.htvm -o holey_ply --quiet
+"$htvm" decode holey.htvm -o holey_obj --format obj --quiet
+expect 0 "frame 3 of holey left out: holey_ply has no such" "$htvm" compare holey holey_ply --only m1
+expect 0 "holey_obj has fewer frames than capture, and they are paired by number: where frames were left out while encoding, those behind are compared with others" \
+    "$htvm" compare capture holey_obj --only m1
+"$htvm" encode capture --first 2 -o behind.htvm --quiet
+"$htvm" decode behind.htvm -o behind --quiet
+expect 0 "frames 0 to 1 of capture left out: behind has no such" "$htvm" compare capture behind --only m1
 
 # Files by name, as a shell makes them of a pattern: in their order, whatever reads a capture.
 "$htvm" encode capture -o folder.htvm --quiet
@@ -112,7 +121,7 @@ has_times tenths.htvm 0 33 100 133
 expect 0 "unit_mm\": 25.4" bash -c "'$htvm' encode capture --unit in -o x.htvm --quiet && '$htvm' info --json x.htvm"
 "$htvm" encode capture -o plain.htvm --quiet
 "$htvm" decode plain.htvm -o dm --unit dm --quiet
-expect 0 "warning: the meshes look as if they were in centimetres, which makes the subject 18 cm tall; if that is wrong" \
+expect 0 "warning: the meshes look as if they were in centimetres, which makes the subject 18 cm tall; in decimetres it would be 1.75 m (--unit dm); if that is wrong" \
     "$htvm" encode dm -o x.htvm
 [ -z "$("$htvm" encode dm --unit dm -o x.htvm --quiet 2>&1)" ] || fail "a unit that is named is doubted"
 "$htvm" encode capture --scale 0.1 -o doll.htvm --quiet

@@ -64,4 +64,42 @@ expect 0 "1 frame" "$htvm" encode linked -o linked.htvm
 linked ../outside.bin
 expect 1 'linked/triangle.gltf: the glTF cannot be read: its buffer "../outside.bin" is not in its folder' "$htvm" encode linked -o linked.htvm
 
+# Colours of vertices multiply the image's in light, for compare and still as for encode: a grey grid, whose right half is
+# tinted dark.
+mkdir tinted
+python3 - <<'PYTHON'
+import base64, json, struct, zlib
+side = 21
+chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+png = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 4, 4, 8, 2, 0, 0, 0)) \
+    + chunk(b"IDAT", zlib.compress((b"\0" + b"\x80\x80\x80" * 4) * 4)) + chunk(b"IEND", b"")
+grid = [(x / (side - 1), y / (side - 1)) for y in range(side) for x in range(side)]
+parts = [b"".join(struct.pack("<3f", x, y, 0.1 * x * y) for x, y in grid), b"".join(struct.pack("<2f", x, y) for x, y in grid),
+         b"".join(struct.pack("<4B", *(3 * [255 if x < 0.5 else 64]), 255) for x, y in grid),
+         b"".join(struct.pack("<6H", i, i + 1, i + side, i + 1, i + side + 1, i + side)
+                  for i in (side * y + x for y in range(side - 1) for x in range(side - 1))), png]
+at, views = 0, []
+for part in parts:
+    views.append({"buffer": 0, "byteOffset": at, "byteLength": len(part)})
+    at += len(part) + -len(part) % 4
+content = b"".join(part + b"\0" * (-len(part) % 4) for part in parts)
+accessors = [{"bufferView": 0, "componentType": 5126, "count": len(grid), "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0.1]},
+             {"bufferView": 1, "componentType": 5126, "count": len(grid), "type": "VEC2"},
+             {"bufferView": 2, "componentType": 5121, "normalized": True, "count": len(grid), "type": "VEC4"},
+             {"bufferView": 3, "componentType": 5123, "count": len(parts[3]) // 2, "type": "SCALAR"}]
+root = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 2}, "indices": 3, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}], "textures": [{"source": 0}],
+        "images": [{"bufferView": 4, "mimeType": "image/png"}], "accessors": accessors, "bufferViews": views,
+        "buffers": [{"byteLength": len(content), "uri": "data:application/octet-stream;base64," + base64.b64encode(content).decode()}]}
+json.dump(root, open("tinted/0.gltf", "w"))
+PYTHON
+"$htvm" encode tinted -q 90 -o tinted.htvm --quiet
+"$htvm" compare tinted tinted.htvm --only m1 --json --quiet >tinted.json
+python3 -c 'import json, sys; sys.exit(json.load(open("tinted.json"))["sequence"]["m1_colour"]["rms_levels"] > 8)' ||
+    fail "compare does not multiply colours as encode does: $(cat tinted.json)"
+"$htvm" still tinted/0.gltf -o tinted.png --width 60 --height 60 --elevation 0 --up y --shading unlit --quiet
+[ "$(python3 "$project/tests/apps/png.py" tinted.png 20,30 40,30 | tail -2 | tr '\n' ' ')" = "128 128 128 66 66 66 " ] ||
+    fail "still does not multiply colours: $(python3 "$project/tests/apps/png.py" tinted.png 20,30 40,30)"
+
 done_with "glTF is read and written as it should be"

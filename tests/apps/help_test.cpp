@@ -26,7 +26,7 @@ Said run(std::vector<std::string> words) {
     Program program;
     program.name = "htvm";
     program.description = "htvm compresses.";
-    program.commands = {add_compare, add_decode, add_encode, add_publish, add_serve, add_synth};
+    program.commands = {add_check, add_compare, add_decode, add_encode, add_publish, add_serve, add_synth};
     words.insert(words.begin(), "htvm");
     std::vector<char*> arguments;
     for (auto& word : words) arguments.push_back(word.data());
@@ -72,7 +72,7 @@ std::vector<std::string> flags_under(const std::string& help, const std::string&
                                       : flags_of(help.substr(begin, help.find("\n\n", begin + 1) - begin));
 }
 
-const std::vector<std::string> long_commands = {"compare", "decode", "encode", "publish", "serve", "synth"};
+const std::vector<std::string> long_commands = {"check", "compare", "decode", "encode", "publish", "serve", "synth"};
 
 TEST(FrontPage, EncodeShowsTheDozenOptionsThatPeopleNeed) {
     const auto page = help("encode");
@@ -160,6 +160,13 @@ TEST(HelpAll, PublishedExperimentsAreByThemselves) {
 TEST(HelpAll, NoOptionOfEncodeIsWithoutAHeading) {
     EXPECT_THAT(flags_under(help("encode", "--help-all"), "Options"),
                 testing::UnorderedElementsAre("--help", "--help-all", "--quiet"));
+}
+
+TEST(HelpAll, OfCheckExplainsTheWordsOfItsReport) {
+    const auto all = help("check", "--help-all");
+    for (const char* word : {"border  ", "turned  ", "doubled  ", "specks  ", "far away  ", "flicker  ", "odd  "})
+        EXPECT_THAT(all, HasSubstr(word));
+    EXPECT_THAT(help("check"), AllOf(HasSubstr("--help-all explains the words of the report"), Not(HasSubstr("rims"))));
 }
 
 TEST(CommandLine, AContradictionIsAUsageErrorThatNamesTheOption) {

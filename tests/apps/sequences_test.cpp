@@ -67,6 +67,47 @@ TEST(FramePairs, OfStreamsGoByTime) {
     EXPECT_EQ(pairs({0, 40000}, {1000, 41000}), Pairs{}) << "another millisecond";
 }
 
+MeshSource files(std::size_t frames, std::vector<std::int64_t> times_us = {}) {
+    MeshSource out;
+    out.frames = frames;
+    for (std::size_t k = 0; k < frames; ++k) out.numbers.push_back(k);
+    out.times_us = std::move(times_us);
+    return out;
+}
+
+Pairs pairs_of_files(const MeshSource& original, const MeshSource& decoded) {
+    Pairs out;
+    for (const auto& pair : pair_files(original, decoded)) out.emplace_back(pair.original, pair.decoded);
+    return out;
+}
+
+TEST(FramePairs, OfFilesGoByTheTimesThatBothTell) {
+    const auto original = files(4, {0, 40000, 90000, 120000});
+    EXPECT_EQ(pairs_of_files(original, files(3, {0, 90000, 120000})), (Pairs{{0, 0}, {2, 1}, {3, 2}}));
+    EXPECT_EQ(pairs_of_files(original, files(3)), (Pairs{{0, 0}, {1, 1}, {2, 2}})) << "by number where one tells none";
+    EXPECT_EQ(pairs_of_files(original, files(3, {5, 33333, 66667})), (Pairs{{0, 0}, {1, 1}, {2, 2}}))
+        << "another clock";
+}
+
+TEST(FramePairs, OfFilesWithoutTimesGoByTheRateOfTheDecodedOnes) {
+    EXPECT_EQ(pairs_of_files(files(6), files(4, {0, 33333, 100000, 166667})), (Pairs{{0, 0}, {1, 1}, {3, 2}, {5, 3}}));
+    EXPECT_EQ(pairs_of_files(files(6), files(3, {66667, 100000, 133333})), (Pairs{{2, 0}, {3, 1}, {4, 2}}))
+        << "the first two are left out";
+    EXPECT_EQ(pairs_of_files(files(6), files(3, {0, 33333, 90000})), (Pairs{{0, 0}, {1, 1}, {2, 2}})) << "not regular";
+    auto every_other = files(3, {0, 66667, 133333});
+    every_other.numbers = {0, 2, 4};
+    EXPECT_EQ(pairs_of_files(files(6), every_other), (Pairs{{0, 0}, {2, 1}, {4, 2}})) << "the originals' own numbers";
+}
+
+TEST(FramePairs, MayBeOutOfStepWhereDecodedFilesTellNoTimes) {
+    EXPECT_TRUE(may_be_out_of_step(files(6), files(5)));
+    EXPECT_FALSE(may_be_out_of_step(files(5), files(5)));
+    EXPECT_FALSE(may_be_out_of_step(files(6), files(5, {0, 1, 2, 3, 4})));
+    auto with_gap = files(5);
+    with_gap.numbers.back() = 5;
+    EXPECT_FALSE(may_be_out_of_step(files(6), with_gap)) << "the originals' own numbers";
+}
+
 TEST(FramePairs, WithoutFramesThereAreNoPairs) {
     EXPECT_EQ(pairs_of({}, {0, 1}), Pairs{});
     EXPECT_EQ(pairs_of({0, 1}, {}), Pairs{});

@@ -66,12 +66,20 @@ expect 1 "square.obj: this is no PNG, JPEG or WebP image; save it as one of them
 mkdir some && grep '^[vf]' square.obj | tee some/a_1.obj >some/a_2.obj && cp skin.png some/a_1.png
 expect 1 "some/a_2.obj: there is no image for it, as there is for others" "$htvm" encode some -o x.htvm
 expect 0 "1 bad frame left out" "$htvm" encode some --on-bad-frame skip -o x.htvm
+# Of the first frame it is no less: the others say what the capture is like.
+mv some/a_1.png some/a_2.png
+expect 1 "some/a_1.obj: there is no image for it, as there is for others" "$htvm" encode some -o x.htvm
+expect 1 "bad          some/a_1.obj: there is no image for it" "$htvm" check some
+expect 1 "1 frame cannot be encoded: mend them" "$htvm" check some
 expect 1 "x.htvm is a stream, whose texture is inside" "$htvm" still x.htvm --texture skin.png -o x.png
 expect 2 "left not in {bottom,top}" "$htvm" still square.obj --texture-origin left -o x.png
 rm skin.png
 expect 1 'square.obj: its image "skin.png" is not in its folder; --texture gives its place, or none to go on without' \
     "$htvm" encode square.obj -o x.htvm
 expect 0 "" "$htvm" encode square.obj --texture none -o x.htvm
+# Where every frame lacks it there is a report all the same.
+expect 1 'bad          every frame; the first of them: square.obj: its image "skin.png" is not in its folder' "$htvm" check square.obj
+expect 1 "  triangles    2" "$htvm" check square.obj
 expect 2 "--texture-as" "$htvm" encode capture --texture-as pixels -o x.htvm
 # A bad image makes its frame a bad one.
 echo nonsense >capture/frame_00001.jpg

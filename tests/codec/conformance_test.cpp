@@ -1,8 +1,8 @@
 // Streams that every version must decode to the same integers, each with a digest per frame: *.htvm and *.digests in
 // tests/data/conformance. Those whose names have no number are of the stream's version 1, NAME_2 and NAME_3 of versions
-// 2 and 3, and no encoder writes them any more; NAME_4 are of version 4, NAME_5 of 5, NAME_6 of 6.
-// HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of versions 4 to 6 that are there; NAME_4 writes that one,
-// whether it is there or not.
+// 2 and 3, and no encoder writes them any more; NAME_4 are of version 4, NAME_5 of 5, NAME_6 of 6,
+// NAME_7 of 7. HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of versions 4 to 7 that are there; NAME_4
+// writes that one, whether it is there or not.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,6 +19,7 @@
 #include "codec/moving_sequences.h"
 #include "codec/patched_sequences.h"
 #include "codec/patches_by_chance.h"
+#include "codec/presence_by_chance.h"
 #include "codec/test_sequences.h"
 #include "codec/tracked_sequences.h"
 #include "core/bytes.h"
@@ -331,6 +332,26 @@ void write_charts() {
     write_stream("charts", ball, options);
 }
 
+// What version 7 brought: frames that say what is there. Of a person with colours and normals, of an open surface with
+// neither, and of meshes without vertices or triangles.
+void write_presence() {
+    TestSequence meshes{"presence", {}, {}};
+    auto person = synthetic(false, 1, 150).frames[0];
+    person.mesh.texcoords.clear();
+    meshes.frames.push_back(person);
+    meshes.frames.push_back(sequence_of(tfan_test::grid(11, 9), 1, none).frames[0]);
+    for (const auto& shape : tfan_test::special_meshes())
+        if (shape.name == "no vertex" || shape.name == "isolated vertices" || shape.name == "three at an edge")
+            meshes.frames.push_back(sequence_of(shape, 1, colours).frames[0]);
+    EncoderOptions options = test::enhanced_options();
+    options.key_interval = 1;
+    options.topology.merge_duplicates = false;
+    options.geometry_step = 6;
+    ChanceMotion motion;
+    motion.fields.step = {64, 20, 20};
+    write_packets("presence", with_presence(encode(meshes, options).packets, 1500, motion, 7));
+}
+
 void write_all() {
     fs::create_directories(folder);
     write_audio_between();
@@ -343,6 +364,7 @@ void write_all() {
     write_patched_by_chance();
     write_grouped();
     write_charts();
+    write_presence();
     write_sequences();
 
     TestSequence spokes{"awkward, moving", {}, {}};

@@ -248,7 +248,7 @@ TEST(TrackedFrames, DecodeToTheSameWithTheColoursInARunOfTheirOwn) {
         head.colour = recoloured.steps;
         const auto write = [&](std::size_t least_run) {
             return write_tracked_runs(head, {nullptr, reference.captured, true},
-                                      {motion.decisions, moved.decisions, &recoloured.decisions}, least_run);
+                                      {motion.decisions, moved.decisions, &recoloured.decisions}, nullptr, least_run);
         };
         const auto together = write(1 << 20);
         EXPECT_EQ(head.colour_run, 0u);

@@ -113,6 +113,14 @@ TEST(LayerShares, AreWhatIsBetweenTheEndsAndNoMoreThanThereIs) {
     EXPECT_EQ(layer_shares({2, 3, 4, 4}, 0, 0).total(), 0u);
 }
 
+TEST(LayerShares, OfPresenceAreWhatIsBetweenTheHeadAndTheMotion) {
+    const auto shares =
+        layer_shares({.head = 2, .motion = 50, .displacement = 60, .colour = 60, .presence = 12}, 92, 0);
+    EXPECT_EQ(shares[Layer::presence], 10u);
+    EXPECT_EQ(shares[Layer::transforms], 38u);
+    EXPECT_EQ(layer_shares({2, 50, 60, 60}, 92, 0)[Layer::presence], 0u);
+}
+
 TEST(LayerShares, OfColoursInTheirOwnRunAreAllOfIt) {
     const auto shares = layer_shares({2, 50, 60, 60}, 92, 30);
     EXPECT_EQ(shares[Layer::transforms], 48u);

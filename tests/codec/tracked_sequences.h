@@ -22,9 +22,10 @@ struct ChanceMotion {
     FieldOptions fields;
 };
 
-// The payload. before: state of the frame that it refers to, or null.
+// The payload. before: state of the frame that it refers to, or null. presence: where the stream tells it.
 inline std::vector<std::uint8_t> tracked_by_chance(const NodeReference& reference, const TrackedState* before,
-                                                   const ChanceMotion& motion, std::mt19937& random) {
+                                                   const ChanceMotion& motion, std::mt19937& random,
+                                                   std::span<const std::uint8_t> presence = {}) {
     const auto number = [&](double size) {
         std::uniform_real_distribution<double> any(-size, size);
         return static_cast<std::int32_t>(any(random));
@@ -68,10 +69,11 @@ inline std::vector<std::uint8_t> tracked_by_chance(const NodeReference& referenc
         coded_colour = *encode_field(reference.hierarchy, colour, 3, fields, before ? &before->colour : nullptr);
     head.colour = coded_colour.steps;
     const std::size_t least_run = random() % 2 == 0 ? 1 : 1 << 30;  // the colours in their own run, or not
+    const PresenceToWrite told{reference.around, before ? before->presence : reference.presence, presence};
     return write_tracked_runs(
                head, {before ? &before->head : nullptr, reference.captured, coloured},
                {coded_motion.decisions, coded_displacement.decisions, coloured ? &coded_colour.decisions : nullptr},
-               least_run)
+               reference.has_presence ? &told : nullptr, least_run)
         .payload;
 }
 

@@ -40,6 +40,17 @@ TEST_F(NamedFile, ByItsName) {
     EXPECT_EQ(found(std::string(100000, 'a')), "");
 }
 
+TEST_F(NamedFile, APathLeadsInsideOfTheFolderOutsideOrNowhere) {
+    fs::create_symlink("../outside.png", folder / "link.png");
+    fs::create_symlink("a.png", folder / "here.png");
+    EXPECT_EQ(named_place(folder, folder / "Textures/../a.png"), NamedPlace::inside);
+    EXPECT_EQ(named_place(folder, folder / "here.png"), NamedPlace::inside);
+    EXPECT_EQ(named_place(folder, folder / "../outside.png"), NamedPlace::outside);
+    EXPECT_EQ(named_place(folder, folder / "link.png"), NamedPlace::outside);
+    EXPECT_EQ(named_place(folder, folder / "gone.png"), NamedPlace::nowhere);
+    EXPECT_EQ(named_place(folder, folder / "Textures"), NamedPlace::nowhere) << "a folder is no file";
+}
+
 TEST_F(NamedFile, InEitherCase) {
     EXPECT_EQ(found("A.PNG"), "a.png");
     EXPECT_EQ(found("textures/skin.png"), "Textures/Skin.PNG");

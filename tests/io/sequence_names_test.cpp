@@ -147,7 +147,11 @@ TEST(OrderOfFrames, ADashIsASignWhereSomeLackIt) {
 
 TEST(OrderOfFrames, SeveralFilesOfEachNumberAreRefused) {
     EXPECT_THAT(error_of({"f1_lod0", "f1_lod1", "f2_lod0", "f2_lod1", "f3_lod0", "f3_lod1"}),
-                AllOf(HasSubstr("3 \"f*_lod0.ply\""), HasSubstr("3 \"f*_lod1.ply\"")));
+                AllOf(HasSubstr("3 \"f*_lod0.ply\""), HasSubstr("3 \"f*_lod1.ply\""),
+                      HasSubstr("as with --ignore \"f*_lod1.ply\"")));
+    EXPECT_THAT(error_of({"f 1 (1)", "f 1 (2)", "f 2 (1)", "f 2 (2)", "f 3 (1)", "f 3 (2)"}),
+                HasSubstr("--ignore \"f * (2).ply\""))
+        << "copies without what they are copies of";
     EXPECT_THAT(error_of({"1", "001", "2"}), AllOf(HasSubstr("1.ply"), HasSubstr("001.ply")));
 }
 

@@ -15,6 +15,7 @@ using testing::ElementsAre;
 using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 class Sequence : public testing::Test {
 protected:
@@ -241,6 +242,30 @@ TEST_F(Sequence, AFolderForEachFrame) {
     ASSERT_EQ(common.remarks.size(), 1u);
     EXPECT_THAT(common.remarks[0].text, HasSubstr("mesh.obj is taken"));
     EXPECT_THAT(files_of("", {{"collision*"}}).remarks, IsEmpty());
+}
+
+TEST_F(Sequence, FoldersForAFrameEachThatHoldLevelsOfDetailSayWhatToIgnore) {
+    touch({"frame_1/lod0.obj", "frame_1/lod1.obj", "frame_2/lod0.obj", "frame_2/lod1.obj"});
+    EXPECT_THAT(error(""), HasSubstr("leave the others out with --ignore \"lod1.obj\""));
+    EXPECT_THAT(files_of("", {{"lod1.obj"}}).numbers, ElementsAre(1u, 2u));
+    for (const char* name : {"frame_1", "frame_2"}) std::filesystem::remove_all(folder / name);
+    touch({"frame_1/body_1.obj", "frame_1/floor_1.obj", "frame_2/body_2.obj", "frame_2/floor_2.obj"});
+    EXPECT_THAT(error(""), HasSubstr("leave the others out with --ignore \"floor_*.obj\""));
+    EXPECT_THAT(files_of("", {{"floor_*.obj"}}).numbers, ElementsAre(1u, 2u));
+}
+
+TEST_F(Sequence, FoldersOfLevelsOfDetailSayWhichToName) {
+    for (const char* lod : {"lod0", "lod1"}) {
+        std::filesystem::create_directories(folder / lod);
+        touch_numbered(lod + std::string("/f"), ".ply", 0, 11);
+    }
+    EXPECT_THAT(error(""), AllOf(HasSubstr("name one of them, such as " + (folder / "lod0").string()),
+                                 Not(HasSubstr("--ignore"))));
+}
+
+TEST_F(Sequence, FoldersOfFoldersSayWhereMeshesAre) {
+    touch({"take/high/1.ply", "take/high/2.ply", "take/low/1.ply"});
+    EXPECT_THAT(error(""), HasSubstr("but " + (folder / "take/high").string() + " holds some: name that"));
 }
 
 TEST_F(Sequence, AFolderAroundACaptureSaysWhichToName) {

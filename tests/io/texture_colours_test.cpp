@@ -102,6 +102,10 @@ TEST(TextureColours, ColoursOfVerticesMultiplyThoseOfTheTextureInLight) {
     const Mesh made = with_vertex_colours({mesh, std::make_shared<const Image>(samples::plain(8, 8, {128, 128, 128}))});
     EXPECT_EQ(made.colours[0], (Colour{128, 128, 128}));
     EXPECT_EQ(made.colours[1], (Colour{61, 0, 128}));
+    const auto shown =
+        colours_with_texture({mesh, std::make_shared<const Image>(samples::plain(8, 8, {128, 128, 128}))});
+    EXPECT_EQ(shown.size(), 6u) << "vertices stay apart";
+    EXPECT_EQ(shown[1], (Colour{61, 0, 128}));
 }
 
 TEST(TextureColours, VerticesWithOtherNormalsStayApart) {

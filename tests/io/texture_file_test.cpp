@@ -306,7 +306,26 @@ TEST_F(TextureFile, SeveralImagesOfAMeshGoIntoOne) {
     EXPECT_THAT(error_of(read("a.obj", 0, {"", TextureOrigin::by_format, true})),
                 HasSubstr("its parts have 2 images;"));
     fs::remove(folder / "b.png");
-    EXPECT_THAT(error_of(read("a.obj")), HasSubstr("its image \"b.png\" is not in its folder"));
+    EXPECT_THAT(error_of(read("a.obj")),
+                HasSubstr("its image \"b.png\", of its material \"two\", is not in its folder; its 2 images belong "
+                          "there: --texture gives one in place of all of them, or none to go on without"));
+}
+
+TEST_F(TextureFile, OneImageForPartsThatHaveTheirOwnIsTold) {
+    image("a.png", red);
+    mesh("m.mtl", "newmtl one\nmap_Kd a.png\nnewmtl two\nmap_Kd b.png\nnewmtl alike\nmap_Kd a.png\n");
+    const auto said_of = [&](const std::string& second) {
+        mesh("a.obj", "mtllib m.mtl\nusemtl one\n" + std::string(obj) + "usemtl " + second + "\nf 1/1 3/3 2/2\n");
+        auto textures =
+            TextureFiles::open({(folder / "a.png").string(), {}}, *find_sequence((folder / "a.obj").string()));
+        EXPECT_TRUE(textures->read(0, TextureUse::where_colourless).has_value());
+        return textures->findings();
+    };
+    const auto two = said_of("two");
+    EXPECT_THAT(abouts(two), testing::ElementsAre("one-image-for-all (loss)"));
+    EXPECT_EQ(two.remarks[0].text,
+              "its parts have 2 images of their own; the one of --texture stands in for all of them");
+    EXPECT_THAT(abouts(said_of("alike")), testing::IsEmpty()) << "one image for all is what the mesh says too";
 }
 
 TEST_F(TextureFile, FramesWithTheSameImagesShareTheirAtlas) {

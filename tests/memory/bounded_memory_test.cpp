@@ -49,14 +49,18 @@ void expect_within_estimate(const std::vector<Packet>& packets, const std::strin
     Decoder decoder(options);
     const auto live = allocations().live;
     MeshCounts reference;
-    bool tracking = false;
+    bool tracking = false, presence = false;
     for (const auto& packet : packets) {
         reset_allocations();
         {
             const auto frame = decoder.decode_copy(packet);
             ASSERT_TRUE(frame.has_value()) << frame.error().message;
         }
-        if (packet.kind == PacketKind::sequence) tracking = read_sequence_header(packet.payload)->node_spacing > 0;
+        if (packet.kind == PacketKind::sequence) {
+            const auto header = *read_sequence_header(packet.payload);
+            tracking = header.node_spacing > 0;
+            presence = header.version >= presence_version;
+        }
         const auto type = frame_type(packet.kind);
         if (!type) continue;
         const auto& rules = rules_of(*type);
@@ -66,9 +70,10 @@ void expect_within_estimate(const std::vector<Packet>& packets, const std::strin
             const auto header = read_frame_payload(packet.payload)->header;
             coded = {header.vertices, header.triangles};
         }
-        const auto kept =
-            memory_of_reference(reference) +
-            (tracking ? memory_of_tracking(reference) + memory_of_tracking(refers ? MeshCounts{} : coded) : 0);
+        const auto renewed = refers ? MeshCounts{} : coded;
+        const auto kept = memory_of_reference(reference) +
+                          (presence ? memory_of_presence(reference) + memory_of_presence(renewed) : 0) +
+                          (tracking ? memory_of_tracking(reference) + memory_of_tracking(renewed) : 0);
         const auto estimate = kept + memory_of_frame(rules.memory, coded, refers ? reference : MeshCounts{});
         const auto taken = static_cast<std::uint64_t>(allocations().most_live - live);
         EXPECT_LE(taken, estimate) << "frame " << packet.frame << ", kind " << static_cast<int>(packet.kind);
@@ -93,6 +98,10 @@ TEST(DecoderMemory, IsWithinWhatTheLimitsTakeItFor) {
     expect_within_estimate(tracked(encode(soup(20000, 0, false, 2), options)), "points, tracked");
     expect_within_estimate(tracked(encode(soup(30000, 10000, true, 2), options)), "triangles apart, tracked");
     expect_within_estimate(tracked(encode(soup(2500, 40000, false, 2), options)), "many triangles, tracked");
+    const auto there = [](const CodedSequence& coded) { return presence_stream(coded.packets); };
+    expect_within_estimate(there(encode(soup(20000, 0, false, 2), options)), "points, some there");
+    expect_within_estimate(there(encode(soup(30000, 10000, true, 2), options)), "triangles apart, some there");
+    expect_within_estimate(there(encode(soup(2500, 40000, false, 2), options)), "many triangles, some there");
 }
 
 TEST(DecoderMemory, IsNotTakenForWhatAHeaderClaims) {

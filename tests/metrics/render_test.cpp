@@ -289,6 +289,17 @@ TEST(Render, ATextureComesBeforeVertexColoursAndGreyBeforeBoth) {
     EXPECT_EQ(pixel_at(render(square, pixel_camera(8, 8), grey), 3, 3), grey.material);
 }
 
+TEST(Render, TintsMultiplyTheTextureInLight) {
+    TexturedMesh square = textured_square(8, {1, 1, {128, 128, 200}});
+    square.tints.assign(square.mesh.positions.size(), {128, 255, 0});
+    const Picture picture = render(square, pixel_camera(8, 8), unlit());
+    EXPECT_EQ(picture.rgb[0], 61);
+    EXPECT_EQ(picture.rgb[1], 128);
+    EXPECT_EQ(picture.rgb[2], 0);
+    square.texture = nullptr;
+    EXPECT_EQ(render(square, pixel_camera(8, 8), unlit()).rgb[0], 200) << "without a texture there is nothing to tint";
+}
+
 TEST(Render, ATextureIsShadedAsVertexColoursAre) {
     const TexturedMesh square = textured_square(8, {1, 1, {200, 100, 50}});
     Mesh coloured = square.mesh;

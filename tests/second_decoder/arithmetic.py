@@ -8,8 +8,8 @@ class Model:
 
     __slots__ = ("one", "seen")
 
-    def __init__(self):
-        self.one, self.seen = 32768, 0
+    def __init__(self, one=32768, seen=0):
+        self.one, self.seen = one, seen
 
     def update(self, bit):
         target = 65535 if bit else 0

@@ -22,8 +22,9 @@ from nodes import Kept, smoothed
 from reference import Reference, decode_pose
 from patched import decode_patched_mesh
 from picture import Pictures
-from stream import (AUDIO, CHARTS, CODEBOOK, ENHANCED, INTRA, PATCHED, PICTURE, POSE, PREDICTED, SEQUENCE, TRACKED, packets,
-                    read_coded_frame, read_frame_payload, read_sequence_header)
+from presence import decode_presence_layer, shown
+from stream import (AUDIO, CHARTS, CODEBOOK, ENHANCED, INTRA, PATCHED, PICTURE, POSE, PREDICTED, PRESENCE, SEQUENCE, TRACKED,
+                    packets, read_coded_frame, read_frame_payload, read_sequence_header)
 from tracked import TrackedReference, decode_tracked_mesh
 
 
@@ -48,25 +49,42 @@ def textured_surface(header, frame, mesh, before=()):
     return TexturedSurface(len(mesh.positions), mesh.triangles, corners) if corners else None
 
 
-class Group:
-    """An I- or TP-frame and what T-frames make of it (8.11)."""
+def intra_presence(header, packet, frame, mesh):
+    """Which vertices of an I-frame are there (8.19), None before version 7."""
+    if header.version < 7:
+        return None
+    vertices = len(mesh.positions)
+    if not packet.referred() or PRESENCE not in frame.layers:
+        return [1] * vertices
+    return decode_presence_layer(frame.layer(PRESENCE), vertices, mesh.triangles)
 
-    def __init__(self, mesh, frame, number, step=1, kept=Kept(), textured=None):
+
+class Group:
+    """An I- or TP-frame and what T-frames make of it (8.11). presence: None before version 7."""
+
+    def __init__(self, mesh, frame, number, step=1, kept=Kept(), textured=None, presence=None):
         self.mesh, self.frame, self.number, self.step, self.kept = mesh, frame, number, step, kept
-        self.textured = textured
+        self.textured, self.presence = textured, presence
         self.reference = self.state = self.last = self.group = None
 
-    def shown(self, mesh):
-        """A mesh of its vertices, as it is shown."""
-        return self.textured.show(mesh) if self.textured else mesh
+    def shown(self, mesh, presence):
+        """A mesh of its vertices, as it is shown. presence: None before version 7."""
+        if self.textured:
+            mesh = self.textured.show(mesh)
+        return mesh if presence is None else shown(mesh, presence, self.textured.copied if self.textured else ())
 
     def tracked_reference(self, header):
         check(header.node_spacing > 0, "the header allows no tracked frames")
         self.reference = self.reference or TrackedReference(
-            self.mesh, self.frame.captured, self.step, header.node_spacing, self.kept)
+            self.mesh, self.frame.captured, self.step, header.node_spacing, self.kept, self.presence)
         return self.reference
 
     def decode(self, packet, header):
+        """The mesh of a T-frame, as it is shown."""
+        mesh, state = self.decode_tracked(packet, header)
+        return self.shown(mesh, state.presence if header.version >= 7 else None)
+
+    def decode_tracked(self, packet, header):
         if header.version < 5:
             return self.decode_single(packet, header, packet.payload)
         length, frame, brought = read_group_payload(packet.payload)
@@ -79,9 +97,9 @@ class Group:
         before = self.before(packet)
         check(packet.referred(), "a group that nothing may refer to")
         group = FrameGroup(packet.frame, length, before)
-        mesh = group.take(header.version, self.tracked_reference(header), frame, brought)
+        mesh, state = group.take(header.version, self.tracked_reference(header), frame, brought)
         self.group, self.state, self.last = group, group.states[length], packet.frame
-        return mesh
+        return mesh, state
 
     def before(self, packet):
         before = self.state if self.last == packet.reference else None
@@ -93,7 +111,7 @@ class Group:
         mesh, state = decode_tracked_mesh(payload, header.version, self.tracked_reference(header), before)
         if packet.referred():
             self.state, self.last, self.group = state, packet.frame, None
-        return mesh
+        return mesh, state
 
     def decode_patched(self, packet, header):
         """The mesh, the joints, and the group that follows."""
@@ -101,14 +119,15 @@ class Group:
         check(packet.referred(), "a patched frame that nothing may refer to")
         frame = read_coded_frame(packet)
         joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
-        mesh, stay, kept = decode_patched_mesh(frame, self.tracked_reference(header))
+        mesh, presence, stay, kept = decode_patched_mesh(frame, self.tracked_reference(header))
         textured = None
         if self.textured:
             stays = set(stay)
             before = [corners for triangle, corners in zip(self.mesh.triangles, self.textured.corners)
                       if stays.issuperset(triangle)]
             textured = textured_surface(header, frame, mesh, before)
-        return mesh, joints, Group(mesh, frame, packet.frame, kept=kept, textured=textured)
+        group = Group(mesh, frame, packet.frame, kept=kept, textured=textured, presence=presence)
+        return mesh, joints, group
 
 
 def decode_stream(data):
@@ -147,25 +166,25 @@ def decode_stream(data):
                         mesh.positions = smoothed(mesh.positions, mesh.triangles, step, at_seams=bool(mesh.texcoords))
                     step = 1
                 textured = textured_surface(header, frame, mesh)
-                shown = textured.show(mesh) if textured else mesh
+                presence = intra_presence(header, packet, frame, mesh)
+                own = Group(mesh, frame, packet.frame, step, textured=textured, presence=presence)
                 if packet.referred():
-                    reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
-                    group = Group(mesh, frame, packet.frame, step, textured=textured)
-                yield packet, header, shown
+                    reference, books, group = Reference(mesh, joints, header, packet.frame), [None, None], own
+                yield packet, header, own.shown(mesh, presence)
             elif packet.kind == TRACKED:
                 check(group, "its reference is not there")
-                yield packet, header, group.shown(group.decode(packet, header))
+                yield packet, header, group.decode(packet, header)
             elif packet.kind == PATCHED:
                 check(group, "its reference is not there")
                 mesh, joints, group = group.decode_patched(packet, header)
                 reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
-                yield packet, header, group.shown(mesh)
+                yield packet, header, group.shown(mesh, group.presence)
             elif packet.kind in (ENHANCED, PREDICTED):
                 check(header, "a frame came before any sequence header")
                 check(reference and reference.frame == packet.reference, "its reference is not there")
                 if packet.kind == PREDICTED:
                     frame = read_frame_payload(packet.payload)
-                    yield packet, header, group.shown(decode_predicted_mesh(frame, reference))
+                    yield packet, header, group.shown(decode_predicted_mesh(frame, reference), group.presence)
                 else:
                     frame = read_coded_frame(packet)
                     yield packet, header, decode_enhanced_mesh(frame, reference, books, header.m)

@@ -2,6 +2,7 @@
 from conventions import Bytes, check, rdiv
 from field import FieldBetween
 from node_motion import Transform
+from presence import presence_between
 from tracked import TrackedState, decode_tracked_mesh
 
 
@@ -66,6 +67,8 @@ def state_between(reference, earlier, later, above, step):
         else:
             largest, others = a.largest, [mixed(x, y) for x, y in zip(a.others, b.others)]
         out.transforms.append(Transform(largest, others, tuple(mixed(x, y) for x, y in zip(a.shift, b.shift))))
+    if reference.presence is not None:
+        out.presence = presence_between(earlier.presence if earlier else reference.presence, later.presence)
     out.displacement = FieldBetween(earlier and earlier.displacement, later.displacement, mixed)
     if reference.mesh.colours:
         out.turned, out.change_steps = above.turned, coarser(above.change_steps)
@@ -81,7 +84,8 @@ class FrameGroup:
         self.states, self.meshes, self.packets = {0: before}, {}, set()
 
     def take(self, version, reference, frame, brought):
-        """What a packet brings; the group changes once all of it is decoded. Returns the mesh of its frame."""
+        """What a packet brings; the group changes once all of it is decoded. Returns the mesh of its frame
+        and its state."""
         states, meshes = dict(self.states), dict(self.meshes)
         for step, payload in brought:
             number, earlier, later, above = step
@@ -91,7 +95,7 @@ class FrameGroup:
             meshes[number], states[number] = decode_tracked_mesh(payload, version, reference, before)
         self.states, self.meshes = states, meshes
         self.packets.add(frame)
-        return self.meshes[frame]
+        return self.meshes[frame], self.states[frame]
 
     def check_goes_on(self, packet, length, frame):
         needed = needed_by(frame, length)

@@ -5,6 +5,7 @@ from conventions import L, check, rdiv
 from fans import FanDecoder, NumberInTurn
 from intra import Mesh, Neighbourhood, decode_colours, decode_positions
 from nodes import Kept, smoothed
+from presence import presence_of_patched
 from stream import BORDER, COLOUR, FANS, GEOMETRY, REMOVED, TRACKED_RUN
 from tracked import decode_tracked_mesh, quantised_normals
 
@@ -87,9 +88,9 @@ def decode_places(data, triangles, vertices, border):
 
 
 def decode_patched_mesh(frame, reference):
-    """The mesh, the vertices that stay, and what it takes over of the reference's nodes. frame: its payload."""
+    """The mesh, its presence, the vertices that stay, and what it takes over of the reference's nodes. frame: its payload."""
     check(not reference.mesh.texcoords, "its reference has texture coordinates")
-    tracked, _ = decode_tracked_mesh(frame.layer(TRACKED_RUN), 4, reference, None)
+    tracked, state = decode_tracked_mesh(frame.layer(TRACKED_RUN), 4, reference, None)
     removed = decode_removed(frame.layer(REMOVED), len(tracked.positions), reference.levels)
     border = open_border(tracked.triangles, removed)
     piece = FanDecoder(frame.layer(FANS), frame.triangles, NumberInTurn(frame.vertices), seed_implies_fan=True).decode()
@@ -123,4 +124,7 @@ def decode_patched_mesh(frame, reference):
     mesh.positions = smoothed(mesh.positions, mesh.triangles, step, len(stay))
     if reference.mesh.normals:
         mesh.normals = quantised_normals(mesh)
-    return mesh, stay, Kept(reference.nodes, stay)
+    presence = None
+    if reference.presence is not None:
+        presence = presence_of_patched(state.presence, stay, len(mesh.positions))
+    return mesh, presence, stay, Kept(reference.nodes, stay)

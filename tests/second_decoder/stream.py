@@ -58,8 +58,8 @@ def read_sequence_header(payload):
     header = Header()
     check(read.take(4) == b"htvm", "this is no htvm stream")
     version = read.field("H")
-    if not 1 <= version <= 6:
-        raise Unsupported("version %d; this decoder reads 1 to 6" % version)
+    if not 1 <= version <= 7:
+        raise Unsupported("version %d; this decoder reads 1 to 7" % version)
     header.version = version
     header.bits = read.field("B")
     header.origin = [read.field("i") for _ in range(3)]
@@ -128,7 +128,7 @@ def read_metadata(read):
 # ---------------------------------------------------------------------------------------------- 4. frame payload
 
 (POSE, TRANSFORMS, GEOMETRY, COLOUR, NORMALS, TEXCOORDS, MAPPING, FANS, DISTANCE_ORDERS, EXTERNAL,
- CODED_BONES, TRACKED_RUN, REMOVED, BORDER, CHARTS) = range(1, 16)
+ CODED_BONES, TRACKED_RUN, REMOVED, BORDER, CHARTS, PRESENCE) = range(1, 17)
 
 
 class Frame:
@@ -151,7 +151,7 @@ def read_frame_payload(payload):
     frame.layers = {}
     for number, size in table:
         layer = read.take(size)
-        if number < 16:
+        if number < 17:
             check(number not in frame.layers, "a layer comes twice")
             frame.layers[number] = layer
     return frame

@@ -9,20 +9,24 @@ from hierarchy import cross, dot, vertex_hierarchy
 from intra import Mesh
 from node_motion import decode_node_motion, decode_node_motion_layer
 from nodes import Nodes, averaged
+from presence import decode_presence, neighbours
 from reference import matrix
 from stream import COLOUR, GEOMETRY, TRANSFORMS, read_frame_payload
 
 
 class TrackedReference:
-    """What all T-frames of an I- or TP-frame share. step: of its positions, 1 if they were smoothed."""
+    """What all T-frames of an I- or TP-frame share. step: of its positions, 1 if they were smoothed. presence: per vertex,
+    None before version 7."""
 
-    def __init__(self, mesh, captured, step, spacing, kept):
+    def __init__(self, mesh, captured, step, spacing, kept, presence):
         self.mesh, self.captured = mesh, captured
         self.positions = averaged(mesh.positions, mesh.triangles, step)
         self.nodes = Nodes(self.positions, mesh.triangles, spacing, kept)
         normals = normals_of(self.positions, mesh.triangles)
         self.node_normals = [normals[v] for v in self.nodes.vertices]
         self.levels = vertex_hierarchy(self.positions, mesh.triangles)
+        self.presence = presence
+        self.around = neighbours(len(mesh.positions), mesh.triangles) if presence is not None else None
 
 
 class TrackedState:
@@ -125,6 +129,8 @@ def decode_run(payload, reference, before):
         if colour_run > 0:
             decoder.end_at(len(payload) - colour_run)
             of_colours = Decoder(payload[len(payload) - colour_run:])
+    if reference.presence is not None:
+        state.presence = decode_presence(decoder, reference.around, before.presence if before else reference.presence)
     vertices = len(reference.mesh.positions)
     state.transforms = decode_node_motion(
         decoder, state.motion_steps, reference.nodes, reference.node_normals, before and before.transforms)

@@ -6,7 +6,8 @@ import { playBeside } from '/player/beside.js';
 const content = document.getElementById('content');
 const address = (path) => `/files/${path.split('/').map(encodeURIComponent).join('/')}`;
 const query = new URLSearchParams(location.search);
-const view = query.has('orbit') ? { orbit: query.get('orbit') } : {};
+const looks = ['orbit', 'up']; // attributes of the player that the page's address gives
+const view = Object.fromEntries(looks.filter((name) => query.has(name)).map((name) => [name, query.get(name)]));
 const updateMs = 3000; // of the list of live streams
 const nameOf = (path) => path.replace(/\.htvm$/, '');
 
@@ -29,7 +30,7 @@ function play(name, attributes, alone) {
 // What the page's address has besides `file`, such as a signed link's query, goes on to the file.
 function playFile(path, alone) {
     const rest = new URLSearchParams(query);
-    for (const own of ['file', 'orbit']) rest.delete(own);
+    for (const own of ['file', ...looks]) rest.delete(own);
     play(nameOf(path), { src: address(path) + (rest.size > 0 ? `?${rest}` : ''), loop: '' }, alone);
 }
 

@@ -1,7 +1,7 @@
 // The pages of `htvm play` and `htvm serve` in Chromium, from the program's own server: HTVM names the program.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
-import { cp, mkdir, mkdtemp, readFile, rm, symlink, writeFile } from 'node:fs/promises';
+import { cp, mkdir, mkdtemp, readFile, readdir, rm, symlink, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
@@ -77,6 +77,25 @@ test('htvm play --orbit says where the stream is seen from', options, () =>
         const { yaw, pitch } = await page.evaluate(() => document.querySelector('htvm-player').view);
         assert.deepEqual([yaw, pitch].map(Math.round).map(Math.abs), [180, 20]);
     }));
+
+test('htvm play takes z for up where the first mesh is longer along it, and the stream does not say', options, async () => {
+    const stream = join(work, 'lying.htvm');
+    const capture = join(work, 'lying');
+    await makeCapture(capture, 3);
+    for (const name of await readdir(capture)) {
+        const path = join(capture, name);
+        await writeFile(path, (await readFile(path, 'utf8')).replace(/^v (\S+) (\S+) (\S+)$/gm, 'v $1 $3 $2'));
+    }
+    execFileSync(program, ['encode', capture, '-o', stream], { stdio: 'pipe' });
+    await running(['play', '--no-open', stream], async (page, address) => {
+        assert.match(address, /\?up=z$/);
+        await page.goto(address);
+        await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 0);
+        assert.equal(await page.evaluate(() => document.querySelector('htvm-player').getAttribute('up')), 'z');
+    });
+    execFileSync(program, ['encode', capture, '--up', 'y', '-o', stream], { stdio: 'pipe' });
+    await running(['play', '--no-open', stream], async (page, address) => assert.match(address, /\d\/$/));
+});
 
 test('htvm play encodes a capture first', options, async () => {
     const capture = join(work, 'capture');

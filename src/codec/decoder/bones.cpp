@@ -34,12 +34,14 @@ Pose moved_pose(const DecoderState& state, std::span<const QuantisedTransform> t
     return pose;
 }
 
-// Connectivity, colours and texture coordinates are those of the I-frame.
+// Connectivity, colours and texture coordinates are those of the I-frame, and so is what is there.
 void show_animated(DecoderState& state, const AnimatedFrame& frame) {
     const auto& mesh = state.reference->mesh();
+    const auto& presence = state.reference->presence;
     show(state,
-         {frame.positions, mesh.triangles, mesh.colours, frame.normals, mesh.texcoords, &state.reference->textured},
-         state.reference_topology, moved_pose(state, frame.transforms));
+         {frame.positions, mesh.triangles, mesh.colours, frame.normals, mesh.texcoords, &state.reference->textured,
+          presence},
+         topology_of_present(state, state.reference_topology, presence), moved_pose(state, frame.transforms));
 }
 
 const Codebook* named(const std::optional<NumberedCodebook>& codebook, std::uint32_t number) {

@@ -228,6 +228,10 @@ std::uint64_t kept_memory(const DecoderState& state, const Packet& packet, const
         if (rules.renews) kept += memory_of_charts(renewed);
         if (state.unreferred) kept += memory_of_charts(counts(state.unreferred->mesh));
     }
+    if (state.header->version >= presence_version) {
+        kept += memory_of_presence(held);
+        if (rules.renews) kept += memory_of_presence(renewed);
+    }
     kept += hidden_frames(state, packet) * memory_of_tracked_frame(held);
     return kept;
 }

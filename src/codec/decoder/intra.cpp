@@ -24,7 +24,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     auto textured = read_charts(state, payload, *mesh);
     if (!textured) return tl::unexpected(textured.error());
     Presence presence;
-    if (header.version >= presence_version && payload.has(Layer::presence)) {
+    if (referred && header.version >= presence_version && payload.has(Layer::presence)) {
         auto read = read_presence_layer(payload.of(Layer::presence), mesh->positions.size(), mesh->triangles);
         if (!read) return tl::unexpected(read.error());
         presence = std::move(*read);

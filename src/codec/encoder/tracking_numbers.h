@@ -57,8 +57,9 @@ struct TrackingNumbers {
     AdultMillimetres far_from_seen{10};  // a vertex farther from captured surface that faces as it does is not shown
     AdultMillimetres filled_hole{90};    // rim of a hole of the first mesh that is closed
     double much_uncovered = 0.03;        // share of the captured surface from which on it is added at once
-    AdultMillimetres grown_from{20};  // side of a square as large as what is uncovered in a region, from which on it is
-    int grown_after = 6;              // added, these many frames behind the last patch
+    AdultMillimetres grown_from{20};     // side of a square as large as what is uncovered in a region, from which on it
+    int grown_after = 6;                 // is added, these many frames behind the last patch,
+    AdultMillimetres grown_at_once{50};  // or at once
     int forgotten_after = 150;        // frames for which a vertex was not seen: the next I-frame leaves it out
     double most_grown = 2.5;          // as most_renewed_vertices, where the reference grows with what is seen
 

@@ -23,6 +23,9 @@ std::uint64_t memory_of_tracking(MeshCounts mesh) { return each(mesh, 416, 48); 
 // What is measured for tracking has two of them.
 std::uint64_t memory_of_tracked_frame(MeshCounts mesh) { return memory_of_tracking(mesh) / 2; }
 
+// The vertices around each vertex, and the triangles that are shown.
+std::uint64_t memory_of_presence(MeshCounts mesh) { return each(mesh, 24, 56); }
+
 std::uint64_t memory_of_frame(const MemoryBound& bound, MeshCounts coded, MeshCounts reference) {
     return memory_of_models + each(coded, bound.coded_vertex, bound.coded_triangle) +
            each(reference, bound.reference_vertex, bound.reference_triangle);

@@ -18,6 +18,7 @@ std::uint64_t memory_of_reference(MeshCounts mesh);      // what an I-frame leav
 std::uint64_t memory_of_charts(MeshCounts mesh);         // what charts add to it
 std::uint64_t memory_of_tracking(MeshCounts mesh);       // what T-frames add to it
 std::uint64_t memory_of_tracked_frame(MeshCounts mesh);  // one that is kept for others of its group
+std::uint64_t memory_of_presence(MeshCounts mesh);       // what telling what is there adds to tracking
 
 // What decoding a frame of some kind takes besides, the frame itself included; in frame_kinds.cpp for each kind.
 struct MemoryBound {

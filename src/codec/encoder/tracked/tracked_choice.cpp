@@ -140,9 +140,10 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
 // now and then, since a patch takes the time of three frames.
 bool should_grow(const TrackedWork& work, const TrackedFit& fit) {
     const auto since = std::int64_t{work.sequence.next_frame} - work.reference->decoded.number;
-    const auto wide = work.configuration.scale.on_lattice(numbers.grown_from);
-    return fit.uncovered_share > numbers.much_uncovered ||
-           (since >= numbers.grown_after && fit.widest_uncovered > wide);
+    const auto& scale = work.configuration.scale;
+    const auto wide = fit.widest_uncovered;
+    return fit.uncovered_share > numbers.much_uncovered || wide > scale.on_lattice(numbers.grown_at_once) ||
+           (since >= numbers.grown_after && wide > scale.on_lattice(numbers.grown_from));
 }
 
 // ---- The steps of a choice ------------------------------------------------------------------------------------------
