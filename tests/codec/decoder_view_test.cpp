@@ -107,7 +107,7 @@ TEST(TopologyNumber, EqualNumbersMeanEqualTrianglesAndTexcoords) {
     }
 }
 
-TEST(TopologyNumber, ChangesAtFramesThatCodeAMeshAlone) {
+TEST(ReferenceTopology, ChangesAtFramesThatCodeAMeshAlone) {
     for (const auto& [name, packets] : conformance_streams()) {
         SCOPED_TRACE(name);
         Decoder decoder(with_draco());
@@ -117,11 +117,11 @@ TEST(TopologyNumber, ChangesAtFramesThatCodeAMeshAlone) {
             if (!frame || !*frame) continue;
             const auto type = (*frame)->info.type;
             if (type == FrameType::tracked || type == FrameType::predicted) {
-                EXPECT_EQ((*frame)->topology, of_intra) << packet.frame;
+                EXPECT_EQ((*frame)->reference_topology, of_intra) << packet.frame;
                 continue;
             }
-            EXPECT_GT((*frame)->topology, most) << packet.frame;
-            most = (*frame)->topology;
+            EXPECT_GT((*frame)->reference_topology, most) << packet.frame;
+            most = (*frame)->reference_topology;
             if (header_with_flags(packet).has(packet_flag::referred)) of_intra = most;
         }
     }
