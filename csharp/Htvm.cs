@@ -84,6 +84,8 @@ namespace Htvm
         public ulong Bytes;
         public uint Topology;
         public uint Sequence;
+        public uint ReferenceTopology; // frames with the same have the same vertices at the same places
+        public uint Absent;            // how many vertices are not there
     }
 
     // Arrays on loan until the next frame; IntPtr.Zero where the frame does not have the attribute.
@@ -98,6 +100,7 @@ namespace Htvm
         public IntPtr Colours;   // byte, red, green, blue per vertex
         public IntPtr Normals;   // float, 3 per vertex
         public IntPtr Texcoords; // float, 2 per vertex
+        public IntPtr Presence;  // byte, 1 per vertex: 0 where it is not there; IntPtr.Zero: all are
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -418,7 +421,7 @@ namespace Htvm
         public readonly Decoder Decoder;
         readonly System.IO.Stream source;
         readonly byte[] piece = new byte[1 << 16];
-        uint? topology;
+        uint? topology, referenceTopology;
         bool ended;
 
         // source: is disposed of with the reader. It may be a file, a socket's stream, or any other.
@@ -433,13 +436,16 @@ namespace Htvm
         public FrameInfo Info { get; private set; }
         public int VertexCount { get { return (int)Info.Vertices; } }
         public int IndexCount { get { return 3 * (int)Info.Triangles; } }
-        // Whether triangles and texture coordinates may differ from those of the frame before.
+        // Whether triangles may differ from those of the frame before.
         public bool TopologyChanged { get; private set; }
+        // Whether the vertices are others than in the frame before, and so may be texture coordinates.
+        public bool ReferenceChanged { get; private set; }
         public float[] Positions = new float[0]; // 3 per vertex, mm
         public int[] Indices = new int[0];       // 3 per triangle, counter-clockwise seen from outside
         public byte[] Colours = new byte[0];     // 3 per vertex; valid if Info.Attributes has Attributes.Colours, and so on
         public float[] Normals = new float[0];   // 3 per vertex
         public float[] Texcoords = new float[0]; // 2 per vertex
+        public byte[] Presence = new byte[0];    // 1 per vertex: 0 where it is not there; valid if Info.Absent is not 0
 
         // Reads the next frame. False at the end of the stream. An exception costs the packet that it is about: call
         // again for the frames behind it.
@@ -466,6 +472,8 @@ namespace Htvm
             Info = info;
             TopologyChanged = topology != info.Topology;
             topology = info.Topology;
+            ReferenceChanged = referenceTopology != info.ReferenceTopology;
+            referenceTopology = info.ReferenceTopology;
             Copy();
             return true;
         }
@@ -490,10 +498,15 @@ namespace Htvm
                 Grow(ref Normals, 3 * vertices);
                 Decoder.CopyNormals(Normals);
             }
-            if (Has(Attributes.Texcoords) && TopologyChanged)
+            if (Has(Attributes.Texcoords) && ReferenceChanged)
             {
                 Grow(ref Texcoords, 2 * vertices);
                 Decoder.CopyTexcoords(Texcoords);
+            }
+            if (Info.Absent > 0)
+            {
+                Grow(ref Presence, vertices);
+                Marshal.Copy(Decoder.View().Presence, Presence, 0, vertices);
             }
         }
 

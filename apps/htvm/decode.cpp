@@ -25,6 +25,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "io/gltf_animation.h"
+#include "io/loose_vertices.h"
 #include "io/mesh_file.h"
 #include "io/output_file.h"
 #include "io/ply.h"
@@ -56,6 +57,7 @@ struct Options {
     std::size_t frames = 0;
     unsigned threads = 0;
     bool json = false;
+    bool all_vertices = false;  // also those that are not there
     DecoderOptions limits;
     HubTrust trust;
 };
@@ -98,9 +100,9 @@ public:
     }
     // Returns the name of the file written.
     Result<std::string> write(Mesh& mesh, const FrameInfo& info, const SequenceInfo& sequence,
-                              double millimetres_per_unit, const ImageFile& image) {
+                              double millimetres_per_unit, const ImageFile& image, GltfTriangles triangles) {
         if (in_metres_) millimetres_per_unit = millimetres_per(LengthUnit::metre);
-        if (animated_) return animate(mesh, info, sequence, millimetres_per_unit, image);
+        if (animated_) return animate(mesh, info, sequence, millimetres_per_unit, image, triangles);
         if (!standard_) {
             const auto path = output_path(names_, info.frame);
             MeshFileOptions file_options;
@@ -152,7 +154,7 @@ private:
         return {};
     }
     Result<std::string> animate(const Mesh& mesh, const FrameInfo& info, const SequenceInfo& sequence,
-                                double millimetres_per_unit, const ImageFile& image) {
+                                double millimetres_per_unit, const ImageFile& image, GltfTriangles triangles) {
         const auto path = output_path(names_, 0);
         const auto in_file = [&](const Error& error) { return fail(error.kind, path.string() + ": " + error.message); };
         if (!animation_) {
@@ -169,7 +171,9 @@ private:
         const double seconds = static_cast<double>(info.timestamp_us) / 1e6;
         if (sequence_ != info.sequence) offset_ = end_ - seconds;
         sequence_ = info.sequence;
-        if (auto ok = animation_->add(mesh, offset_ + seconds, fmt::format("frame {}", info.frame), image.bytes); !ok)
+        if (auto ok =
+                animation_->add(mesh, offset_ + seconds, fmt::format("frame {}", info.frame), image.bytes, triangles);
+            !ok)
             return in_file(ok.error());
         end_ = offset_ + seconds + static_cast<double>(sequence.fps_denominator) / sequence.fps_numerator;
         return path.string();
@@ -222,7 +226,12 @@ bool is_enough(const Decoding& d) { return d.options.frames > 0 && d.summary.wri
 Result<void> write_now(Decoding& d, DecodedFrame& frame, const SequenceInfo& sequence) {
     const auto image = frame.mesh.texcoords.empty() ? Result<ImageFile>(ImageFile{}) : d.textures.image();
     if (!image) return tl::unexpected(image.error());
-    const auto name = d.output.write(frame.mesh, frame.info, sequence, output_unit(d.options, sequence), *image);
+    // Such a frame's triangles are those of no other, most often.
+    const bool is_part = !frame.presence.empty();
+    if (is_part && !d.options.all_vertices) drop_loose_vertices(frame.mesh);
+    frame.info.vertices = static_cast<std::uint32_t>(frame.mesh.positions.size());
+    const auto name = d.output.write(frame.mesh, frame.info, sequence, output_unit(d.options, sequence), *image,
+                                     is_part ? GltfTriangles::of_one_frame : GltfTriangles::of_many_frames);
     if (!name) return tl::unexpected(name.error());
     d.summary.times.numbers.push_back(frame.info.frame);
     d.summary.times.microseconds.push_back(frame.info.timestamp_us);
@@ -600,6 +609,12 @@ void add_decode(CLI::App& app, Run& run) {
     command
         ->add_option("--threads", options->threads, "Threads (default: one per core); the meshes do not depend on it")
         ->group(heading::parallel);
+    command
+        ->add_flag(
+            "--all-vertices", options->all_vertices,
+            "Also write the vertices that are not there in a frame and that no triangle names, so that vertices keep "
+            "their places while frames have one reference")
+        ->group(heading::output);
     command->add_flag("--json", options->json, "Print what was decoded as JSON on standard output")
         ->group(heading::scripts);
     add_hub_trust(*command, options->trust);

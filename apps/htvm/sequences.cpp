@@ -19,6 +19,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "htvm/picture_decoder.hpp"
+#include "io/loose_vertices.h"
 #include "io/mesh_file.h"
 #include "io/recording.h"
 #include "io/sequence.h"
@@ -108,6 +109,7 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
             auto frame = decoder.decode_copy(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
             if (!*frame || numbers.of((*frame)->info.frame) != number) continue;
+            if (!(*frame)->presence.empty()) drop_loose_vertices((*frame)->mesh);
             TexturedMesh out(std::move((*frame)->mesh));
             // Its picture comes behind it, before the next frame.
             const auto is_beside = [](PacketKind kind) {

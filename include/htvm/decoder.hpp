@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "htvm/frame.hpp"
@@ -72,9 +73,17 @@ struct SequenceInfo {
 struct FrameView {
     FrameInfo info;
     // Frames with the same number have the same triangles and texture coordinates, so these need not be sent to a
-    // graphics card again. T- and P-frames have the number of the I- or TP-frame that is their reference; every
-    // other frame has a new one. Never 0; numbers of different decoders are unrelated.
+    // graphics card again. T- and P-frames have the number of the I- or TP-frame that is their reference, unless other
+    // vertices of it are there (presence); every other frame has a new one. Never 0; numbers of different decoders are
+    // unrelated.
     std::uint32_t topology = 0;
+    // The number of the mesh of which a frame may show a part. Frames with the same have the same vertices at the same
+    // places of the arrays, and the same texture coordinates; their triangles are those of that mesh whose three
+    // vertices are there. It is the frame's topology where all vertices are.
+    std::uint32_t reference_topology = 0;
+    // One per vertex: 1, or 0 where it is not there. No triangle names such a vertex, and its position is a guess at
+    // what nobody saw. Empty: all are there, as in streams before version 7.
+    std::span<const std::uint8_t> presence;
     MeshView mesh;  // mm
     // Never null. For an I-frame, the skeleton as sent; for other frames, that of the I-frame moved by the transforms.
     const Pose* pose = nullptr;
@@ -84,7 +93,8 @@ struct FrameView {
 // The same as a copy that the caller owns.
 struct DecodedFrame {
     FrameInfo info;
-    std::uint32_t topology = 0;
+    std::uint32_t topology = 0, reference_topology = 0;
+    std::vector<std::uint8_t> presence;
     Mesh mesh;
     Pose pose;
     bool concealed = false;

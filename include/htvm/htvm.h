@@ -132,6 +132,11 @@ typedef struct htvm_frame_info {
     uint32_t topology; /* frames of a decoder with the same number have the same triangles and texture coordinates; 0
                           from an encoder */
     uint32_t sequence; /* which sequence of the stream it belongs to, as in htvm_sequence_info; 0 from an encoder */
+    uint32_t reference_topology; /* frames of a decoder with the same number have the same vertices at the same places
+                                    of the arrays, and the same texture coordinates. It is the topology of a frame that
+                                    shows all of the mesh; one that shows a part has another topology, and its triangles
+                                    are those whose three vertices are there. 0 from an encoder */
+    uint32_t absent; /* how many vertices are not there, as htvm_mesh_view.presence says; 0 from an encoder */
 } htvm_frame_info;
 
 /* ---- decoder -------------------------------------------------------------------------------------------------- */
@@ -211,6 +216,9 @@ typedef struct htvm_mesh_view {
     const uint8_t* colours;  /* red, green, blue per vertex; NULL: the frame has none */
     const float* normals;    /* 3 per vertex, unit length; or NULL */
     const float* texcoords;  /* 2 per vertex, or NULL */
+    const uint8_t* presence; /* 1 per vertex: 1, or 0 where it is not there. No triangle names such a vertex, and its
+                              * position is a guess at what nobody saw. NULL: all are there, as in streams before
+                              * version 7 */
 } htvm_mesh_view;
 
 /* HTVM_BAD_INPUT: there is no current frame, or view_size is not sizeof(htvm_mesh_view). */

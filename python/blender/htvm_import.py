@@ -71,7 +71,8 @@ def reader_of(path):
 
 
 def fill(mesh, frame):
-    """Makes the Blender mesh the frame's. Frames of one topology share their array of triangles."""
+    """Makes the Blender mesh the frame's. Frames of one topology share their array of triangles, if all of it is there."""
+    frame = frame.shown()
     n, m = len(frame.positions), len(frame.triangles)
     if shown.get(mesh.name) is not frame.triangles or (len(mesh.vertices), len(mesh.polygons)) != (n, m):
         mesh.clear_geometry()

@@ -92,6 +92,8 @@ class htvm_frame_info(Structure):
         ("bytes", c_uint64),
         ("topology", c_uint32),
         ("sequence", c_uint32),
+        ("reference_topology", c_uint32),
+        ("absent", c_uint32),
     ]
 
 
@@ -106,6 +108,7 @@ class htvm_mesh_view(Structure):
         ("colours", POINTER(c_uint8)),
         ("normals", POINTER(c_float)),
         ("texcoords", POINTER(c_float)),
+        ("presence", POINTER(c_uint8)),
     ]
 
 

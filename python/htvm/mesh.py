@@ -91,6 +91,10 @@ def copied_attribute(numbers: Any, rows: int, columns: int, type_: Any) -> Optio
     return copied(numbers, rows, columns, type_) if numbers else None
 
 
+def copied_presence(numbers: Any, rows: int) -> Optional[NDArray[np.bool_]]:
+    return copied(numbers, rows, 1, np.uint8)[:, 0].astype(bool) if numbers else None
+
+
 def read_mesh(path: Path, unit: str = "auto") -> Mesh:
     """Reads a mesh file (PLY, OBJ, Draco, glTF), as ``htvm encode`` does.
 

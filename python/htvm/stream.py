@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import io
 import mmap
 import operator
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from . import _interface as c
 from .errors import BadInput, CorruptStream, Error
-from .mesh import Mesh, copied, copied_attribute
+from .mesh import Mesh, copied, copied_attribute, copied_presence
 from .skeleton import Skeleton
 
 Source = Union[str, "os.PathLike[str]", bytes, bytearray, memoryview, BinaryIO]
@@ -34,7 +35,9 @@ class Frame(Mesh):
     """A decoded mesh. Its arrays stay as they are when the next frame is decoded.
 
     Frames with the same topology have the same triangles and texture coordinates: these are one read-only array, which
-    they share. `copy` gives a frame with arrays of its own.
+    they share. Frames with the same reference_topology have the same vertices at the same places, and share texture
+    coordinates; those that show a part of that mesh (presence) have only the triangles whose three vertices are there.
+    `copy` gives a frame with arrays of its own, `shown` one without the vertices that are not there.
     """
 
     number: int = 0  # in the whole stream, from 0
@@ -42,6 +45,8 @@ class Frame(Mesh):
     kind: str = ""  # "I", "EP", "P", "T" or "TP": docs/glossary.md
     bytes: int = 0  # of its packet
     topology: int = 0  # of frames of one iteration, the same if they have the same triangles and texcoords
+    reference_topology: int = 0  # likewise, the same if they have the same vertices and texcoords
+    presence: Optional[NDArray[np.bool_]] = None  # (n,): which vertices are there; None: all. The others are in no triangle
     joints: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))  # (j, 3), millimetres
     orientations: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3, 3)))  # (b, 3, 3), of the bones
 
@@ -49,6 +54,16 @@ class Frame(Mesh):
     def timestamp(self) -> float:
         """Seconds."""
         return self.timestamp_us / 1e6
+
+    def shown(self) -> "Frame":
+        """The frame without the vertices that no triangle names, where some are not there; else the frame itself."""
+        if self.presence is None:
+            return self
+        kept, triangles = np.unique(self.triangles, return_inverse=True)
+        rows = {name: None if getattr(self, name) is None else getattr(self, name)[kept]
+                for name in ("positions", "colours", "normals", "texcoords")}
+        return dataclasses.replace(
+            self, triangles=triangles.reshape(-1, 3).astype(np.uint32), presence=None, **rows)
 
 
 @dataclass(frozen=True)
@@ -281,13 +296,16 @@ class _Decoder:
         self._check(c.library.htvm_decoder_view(self._handle, view, ctypes.sizeof(view)))
         n, last = view.vertices, self._last
         if last is not None and last.topology == view.topology:
-            triangles, texcoords = last.triangles, last.texcoords
+            triangles = last.triangles
         else:
             triangles = copied(view.indices, view.triangles, 3, np.uint32)
+            triangles.flags.writeable = False
+        if last is not None and last.reference_topology == info.reference_topology:
+            texcoords = last.texcoords
+        else:
             texcoords = copied_attribute(view.texcoords, n, 2, np.float32)
-            for shared in (triangles, texcoords):
-                if shared is not None:
-                    shared.flags.writeable = False
+            if texcoords is not None:
+                texcoords.flags.writeable = False
         joints, orientations = np.empty((info.joints, 3)), np.empty((info.bones, 3, 3))
         for array, copy in ((joints, c.library.htvm_decoder_copy_joints),
                             (orientations, c.library.htvm_decoder_copy_orientations)):
@@ -296,7 +314,8 @@ class _Decoder:
             copied(view.positions, n, 3, np.float32), triangles, copied_attribute(view.colours, n, 3, np.uint8),
             copied_attribute(view.normals, n, 3, np.float32), texcoords, number=number,
             timestamp_us=info.timestamp_us, kind=c.library.htvm_frame_kind_letter(info.type).decode(),
-            bytes=info.bytes, topology=info.topology, joints=joints, orientations=orientations)
+            bytes=info.bytes, topology=info.topology, reference_topology=info.reference_topology,
+            presence=copied_presence(view.presence, n), joints=joints, orientations=orientations)
         return self._last
 
     def sequence(self) -> Optional[Sequence]:

@@ -87,6 +87,34 @@ def test_frames_of_a_topology_share_their_triangles_which_cannot_be_written_to(s
     frames[0].copy().triangles[0] = 0
 
 
+def test_a_frame_says_which_vertices_are_there():
+    frames = list(htvm.open(conformance / "presence_7.htvm"))
+    assert {frame.presence is None for frame in frames} == {True, False}
+    first = {}
+    for frame in frames:
+        of_reference = first.setdefault(frame.reference_topology, frame)
+        assert len(frame.positions) == len(of_reference.positions)
+        assert (frame.texcoords is None) == (of_reference.texcoords is None)
+        assert frame.texcoords is None or np.array_equal(frame.texcoords, of_reference.texcoords)
+        assert (frame.topology == frame.reference_topology) == (frame.presence is None)
+        if frame.presence is not None:
+            assert frame.presence.shape == (len(frame.positions),) and not frame.presence.all()
+            assert frame.presence[frame.triangles].all()
+
+
+def test_shown_leaves_out_what_no_triangle_names():
+    frame = next(f for f in htvm.open(conformance / "presence_7.htvm") if f.presence is not None)
+    shown = frame.shown()
+    assert shown.presence is None and shown.number == frame.number
+    assert sorted(np.unique(shown.triangles)) == list(range(len(shown.positions)))
+    assert len(shown.positions) < len(frame.positions)
+    for name in ("positions", "colours", "normals", "texcoords"):
+        rows = getattr(frame, name)
+        assert rows is None or np.array_equal(rows[frame.triangles], getattr(shown, name)[shown.triangles])
+    whole = next(f for f in htvm.open(conformance / "presence_7.htvm") if f.presence is None)
+    assert whole.shown() is whole
+
+
 @pytest.mark.parametrize("path", streams, ids=lambda path: path.stem)
 def test_any_frame_can_be_the_first(path):
     stream = htvm.open(path)

@@ -81,6 +81,8 @@ htvm_status describe_current(htvm_decoder& decoder, htvm_frame_info* info, std::
     out.joints = static_cast<std::uint32_t>(frame.pose->joints.size());
     out.bones = static_cast<std::uint32_t>(frame.pose->orientations.size());
     out.topology = frame.topology;
+    out.reference_topology = frame.reference_topology;
+    out.absent = static_cast<std::uint32_t>(std::ranges::count(frame.presence, 0));
     out.concealed = frame.concealed;
     if (!info) return HTVM_OK;
     const auto written = htvm::c_api::write_struct(out, info, info_size);
@@ -266,7 +268,9 @@ htvm_status htvm_decoder_unused_bytes(const htvm_decoder* decoder, uint64_t* dam
 htvm_status htvm_decoder_view(htvm_decoder* decoder, htvm_mesh_view* view, size_t view_size) {
     if (!decoder) return HTVM_BAD_INPUT;
     if (!decoder->current) return no_frame(decoder->error);
-    const auto out = htvm::c_api::lent(decoder->current->mesh, decoder->current->topology);
+    auto out = htvm::c_api::lent(decoder->current->mesh, decoder->current->topology);
+    const auto& presence = decoder->current->presence;
+    if (!presence.empty()) out.presence = presence.data();
     const auto written = htvm::c_api::write_struct(out, view, view_size);
     return written == HTVM_OK ? HTVM_OK : decoder->error.set(written, "view is NULL or view_size not its sizeof");
 }

@@ -86,7 +86,8 @@ Result<void> GltfAnimation::show_last_until(std::optional<float> next, float end
 }
 
 Result<void> GltfAnimation::add(const Mesh& mesh, double seconds, const std::string& name,
-                                const std::shared_ptr<const std::vector<std::uint8_t>>& image) {
+                                const std::shared_ptr<const std::vector<std::uint8_t>>& image,
+                                GltfTriangles triangles) {
     if (auto ok = check_mesh(mesh); !ok) return ok;
     const float begin = last_ ? time_after(last_->begin, seconds) : 0.0f;
     if (auto ok = show_last_until(begin, begin); !ok) return ok;
@@ -99,8 +100,9 @@ Result<void> GltfAnimation::add(const Mesh& mesh, double seconds, const std::str
         image_ = add_image(buffer_, *image);
         last_image_ = image;
     }
-    json node = {{"name", name},
-                 {"mesh", add_mesh(buffer_, scaled, topology_, textured ? std::optional(image_) : std::nullopt)}};
+    json node = {
+        {"name", name},
+        {"mesh", add_mesh(buffer_, scaled, topology_, textured ? std::optional(image_) : std::nullopt, triangles)}};
     // As players that know no animations show it: the first frame alone.
     if (begin > 0) node["scale"] = hidden;
     nodes_.push_back(std::move(node));

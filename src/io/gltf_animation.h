@@ -24,6 +24,9 @@ struct GltfAnimationOptions {
     GlobalShift global_shift{};          // mm: where the meshes stand
 };
 
+// Whether a frame's triangles may be those of others, which then share them.
+using GltfTriangles = internal::GltfTriangles;
+
 // Frames go to disk as they come: what stays in memory are some hundred bytes for each, and one frame's triangles.
 class GltfAnimation {
 public:
@@ -32,9 +35,11 @@ public:
     // A frame that is shown from then on; in mm. A time that is not after the one before is put right after it. A mesh
     // without vertices shows nothing. Fails (bad_input) if check_mesh does or a position is too large; (limit) if the
     // file would become larger than the 4 GiB that a .glb can hold; disk_full.
+    // triangles: those of one frame take two bytes an index where the mesh has few enough vertices.
     // image: the file of its texture's image (gltf.h); one that is the same memory as the last is not repeated.
     Result<void> add(const Mesh& mesh, double seconds, const std::string& name,
-                     const std::shared_ptr<const std::vector<std::uint8_t>>& image = nullptr);
+                     const std::shared_ptr<const std::vector<std::uint8_t>>& image = nullptr,
+                     GltfTriangles triangles = GltfTriangles::of_many_frames);
     // end_seconds: when the last frame ends.
     Result<void> finish(double end_seconds);
 

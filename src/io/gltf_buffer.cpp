@@ -88,11 +88,13 @@ std::size_t add_colours(GltfBuffer& buffer, std::span<const Colour> colours) {
     return accessor;
 }
 
-std::size_t add_triangles(GltfBuffer& buffer, std::span<const Triangle> triangles) {
+std::size_t add_triangles(GltfBuffer& buffer, std::span<const Triangle> triangles, GltfComponent component) {
     const auto begin = buffer.size();
     for (const auto& triangle : triangles)
-        for (const auto index : triangle) put(buffer, index, 4);
-    return add_accessor(buffer, begin, Target::triangles, GltfComponent::u32, "SCALAR", 3 * triangles.size());
+        for (const auto index : triangle) put(buffer, index, component == GltfComponent::u16 ? 2 : 4);
+    const auto accessor = add_accessor(buffer, begin, Target::triangles, component, "SCALAR", 3 * triangles.size());
+    while (buffer.size() % 4 != 0) buffer.bytes.push_back(0);
+    return accessor;
 }
 
 std::size_t add_texcoords(GltfBuffer& buffer, std::span<const Vector2f> texcoords) {
@@ -112,10 +114,15 @@ std::size_t add_image(GltfBuffer& buffer, std::span<const std::uint8_t> file) {
     return buffer.images.size() - 1;
 }
 
-std::size_t add_mesh(GltfBuffer& buffer, const Mesh& mesh, GltfTopology& topology, std::optional<std::size_t> image) {
+std::size_t add_mesh(GltfBuffer& buffer, const Mesh& mesh, GltfTopology& topology, std::optional<std::size_t> image,
+                     GltfTriangles triangles) {
+    // The largest number of two bytes is none that an index may have.
+    const bool fits = triangles == GltfTriangles::of_one_frame && mesh.positions.size() <= 0xFFFF;
     if (!topology.known || topology.triangles != mesh.triangles || topology.texcoords != mesh.texcoords) {
         topology = {mesh.triangles, mesh.texcoords, 0, 0, true};
-        if (!mesh.triangles.empty()) topology.triangle_accessor = add_triangles(buffer, mesh.triangles);
+        if (!mesh.triangles.empty())
+            topology.triangle_accessor =
+                add_triangles(buffer, mesh.triangles, fits ? GltfComponent::u16 : GltfComponent::u32);
         if (!mesh.texcoords.empty()) topology.texcoord_accessor = add_texcoords(buffer, mesh.texcoords);
     }
     json attributes = {{"POSITION", add_positions(buffer, mesh.positions)}};

@@ -28,6 +28,9 @@ struct GltfTopology {
     bool known = false;
 };
 
+// Whose a mesh's triangles are. Those of one frame alone take two bytes an index where they can.
+enum class GltfTriangles { of_many_frames, of_one_frame };
+
 // Adds the file of an image, PNG or JPEG, and gives its number.
 std::size_t add_image(GltfBuffer& buffer, std::span<const std::uint8_t> file);
 
@@ -36,7 +39,8 @@ std::size_t add_image(GltfBuffer& buffer, std::span<const std::uint8_t> file);
 // afterwards it holds the mesh's. image: the number of its texture's, if it has one, in whose place it then has no
 // colours.
 std::size_t add_mesh(GltfBuffer& buffer, const Mesh& mesh, GltfTopology& topology,
-                     std::optional<std::size_t> image = std::nullopt);
+                     std::optional<std::size_t> image = std::nullopt,
+                     GltfTriangles triangles = GltfTriangles::of_many_frames);
 
 // An accessor of single floats, or of rows of three, as samplers of animations need them; bounds are given in the JSON.
 std::size_t add_numbers(GltfBuffer& buffer, std::span<const float> numbers);

@@ -52,6 +52,38 @@ expect 3 "5 frames were decoded" "$htvm" decode short.htvm -o short.glb
 [ "$(meshes short.glb | tr -cd , | wc -c)" -eq 8 ] || fail "short.glb: $(meshes short.glb)"
 [ -z "$(find . -name '*.partial')" ] || fail "something is left: $(find . -name '*.partial')"
 
+# A frame that shows a part of its mesh is written without the vertices that no triangle names, unless they are asked for.
+presence=$project/tests/data/conformance/presence_7.htvm
+parts() { "$htvm" decode "$presence" --json --quiet "$@" >parts.json && python3 -c '
+import glob, json, struct, sys
+loose = []
+for frame in json.load(open("parts.json"))["frames"]:
+    content = open(frame["file"], "rb").read()
+    root = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])
+    binary = content[28 + struct.unpack("<I", content[12:16])[0] :]
+    loose.append(0)
+    for mesh in root.get("meshes", []):
+        primitive = mesh["primitives"][0]
+        count = root["accessors"][primitive["attributes"]["POSITION"]]["count"]
+        assert count == frame["vertices"], (count, frame)
+        if "indices" not in primitive: continue
+        accessor = root["accessors"][primitive["indices"]]
+        at = root["bufferViews"][accessor["bufferView"]]["byteOffset"]
+        loose[-1] += count - len(set(struct.unpack_from("<%dI" % accessor["count"], binary, at)))
+print("none" if not any(loose) else "some")
+'; }
+[ "$(parts -o 'parts/%05d.glb')" = none ] || fail "vertices that are not there are written: $(parts -o 'parts/%05d.glb')"
+[ "$(parts -o 'all/%05d.glb' --all-vertices)" = some ] || fail "--all-vertices leaves some out"
+# In the animated file the triangles of such a frame take two bytes an index; those of whole frames are shared.
+"$htvm" decode "$presence" -o parts.glb --quiet
+python3 - <<'PYTHON' || fail "parts.glb does not have indices of both kinds"
+import json, struct
+content = open("parts.glb", "rb").read()
+root = json.loads(content[20 : 20 + struct.unpack("<I", content[12:16])[0]])
+kinds = {root["accessors"][m["primitives"][0]["indices"]]["componentType"] for m in root["meshes"] if "indices" in m["primitives"][0]}
+assert kinds == {5123, 5125}, kinds
+PYTHON
+
 # Buffers in files of their own: beside the .gltf, not elsewhere.
 mkdir linked
 printf '\0\0\0\0\0\0\0\0\0\0\0\0\0\0\200\77\0\0\0\0\0\0\0\0\0\0\0\0\0\0\200\77\0\0\0\0' >linked/positions.bin

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <string>
 
@@ -44,6 +47,8 @@ void expect_same_frame(htvm_decoder* decoder, const htvm_frame_info& info, const
     EXPECT_EQ(info.concealed, expected.concealed ? 1u : 0u);
     EXPECT_EQ(info.topology, expected.topology);
     EXPECT_EQ(info.sequence, expected.info.sequence);
+    EXPECT_EQ(info.reference_topology, expected.reference_topology);
+    EXPECT_EQ(info.absent, static_cast<std::uint32_t>(std::ranges::count(expected.presence, 0)));
     expect_same_mesh(copied_mesh(decoder, info), expected.mesh);
     expect_same_mesh(lent_mesh(decoder, info), expected.mesh);
     const auto pose = copied_pose(decoder, info);
@@ -399,6 +404,37 @@ TEST(CDecoder, SurvivesMisuse) {
         << "bytes were sent before";
     ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded_grid().bytes.data(), coded_grid().bytes.size()), HTVM_OK);
     EXPECT_EQ(htvm_decoder_receive_frame(decoder.get(), &info, 3), HTVM_BAD_INPUT) << "a struct of 3 bytes";
+}
+
+TEST(CDecoder, LendsWhichVerticesAreThere) {
+    std::ifstream in(HTVM_TEST_DATA "/conformance/presence_7.htvm", std::ios::binary);
+    const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), {}};
+    const auto decoder = make_decoder();
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), bytes.data(), bytes.size()), HTVM_OK);
+    htvm_frame_info info;
+    std::size_t parts = 0, whole = 0;
+    while (htvm_decoder_receive_frame(decoder.get(), &info, sizeof info) == HTVM_OK) {
+        htvm_mesh_view view;
+        ASSERT_EQ(htvm_decoder_view(decoder.get(), &view, sizeof view), HTVM_OK);
+        EXPECT_EQ(view.presence == nullptr, info.absent == 0);
+        EXPECT_EQ(info.topology == info.reference_topology, info.absent == 0);
+        if (!view.presence) {
+            ++whole;
+            continue;
+        }
+        ++parts;
+        EXPECT_EQ(std::count(view.presence, view.presence + view.vertices, 0), info.absent);
+        for (std::uint32_t i = 0; i < 3 * view.triangles; ++i) ASSERT_EQ(view.presence[view.indices[i]], 1);
+    }
+    EXPECT_GT(parts, 0u);
+    EXPECT_GT(whole, 0u);
+    // To a program whose htvm_mesh_view ends with the texture coordinates, nothing is written behind them.
+    ASSERT_EQ(htvm_decoder_conceal(decoder.get(), 99, 0, nullptr, 0), HTVM_OK);
+    htvm_mesh_view older;
+    std::memset(&older, 0xAB, sizeof older);
+    ASSERT_EQ(htvm_decoder_view(decoder.get(), &older, offsetof(htvm_mesh_view, presence)), HTVM_OK);
+    EXPECT_EQ(older.struct_size, offsetof(htvm_mesh_view, presence));
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(older.presence) & 0xFF, 0xABu);
 }
 
 TEST(CDecoder, StructsOfOtherVersionsAreRead) {

@@ -203,6 +203,22 @@ TEST(PresenceDecoder, TheSamePresenceHasTheSameTopologyNumberAndAllOfItTheRefere
             }
 }
 
+TEST(PresenceDecoder, LendsWhichVerticesAreThereAndWhichMeshTheyArePartsOf) {
+    auto stream = grid_stream(Removal::nothing, false);
+    const auto all = stream.last_presence(false);
+    auto one = all;
+    one[3] = 0;
+    for (const auto& presence : {all, one, all}) stream.add_tracked(false, presence);
+    const auto frames = frames_of(stream);
+    ASSERT_EQ(frames.size(), 4u);
+    const std::vector<Presence> expected{{}, {}, one, {}};  // none where all are there
+    for (std::size_t f = 0; f < frames.size(); ++f) {
+        EXPECT_EQ(frames[f].presence, expected[f]) << f;
+        EXPECT_EQ(frames[f].reference_topology, frames[0].topology) << f;
+    }
+    EXPECT_NE(frames[2].topology, frames[2].reference_topology);
+}
+
 TEST(PresenceDecoder, AnIntraFramesLayerSaysWhatIsThereOfItAndOfWhatRefersToIt) {
     auto stream = grid_stream(Removal::region);
     stream.add_tracked(false, stream.last_presence(false));

@@ -652,6 +652,24 @@ TEST_F(GltfStream, EqualTrianglesAreThereOnce) {
     EXPECT_NE(of(1, "indices"), of(2, "indices"));
 }
 
+TEST_F(GltfStream, TrianglesOfOneFrameTakeTwoBytesAnIndexWhereTheVerticesAreFewEnough) {
+    // An odd number of indices, so that what is behind them has to be brought to a multiple of four bytes.
+    Mesh few = random_mesh(1, 0xFFFF, 13), many = random_mesh(2, 0x10000, 13);
+    few.triangles[12] = {0, 1, 0xFFFE};
+    for (const auto& [mesh, type] : {std::pair(few, 5123), std::pair(many, 5125)}) {
+        auto animation = GltfAnimation::create(path);
+        ASSERT_TRUE(animation->add(mesh, 0, "first", nullptr, GltfTriangles::of_one_frame));
+        ASSERT_TRUE(animation->finish(1));
+        const json file = root();
+        EXPECT_EQ(file["accessors"][file["meshes"][0]["primitives"][0]["indices"].get<std::size_t>()]["componentType"],
+                  type);
+        const auto read = read_mesh(path);
+        ASSERT_TRUE(read) << read.error().message;
+        EXPECT_EQ(read->triangles, mesh.triangles);
+        EXPECT_EQ(read->colours, mesh.colours);
+    }
+}
+
 TEST_F(GltfStream, WhatIsUpBecomesY) {
     Mesh mesh;
     mesh.positions = {{0, 0, 2000}, {1000, 0, 0}};

@@ -60,7 +60,7 @@ const failure = (page) => page.evaluate(() => test.player.error);
 const lastLine = async (page) => (await lines(page)).at(-1);
 
 for (const name of ['tracked', 'person', 'paper', 'moving', 'fine_lattice', 'no_skeleton_all_attributes', 'corner_cases_intra',
-    'rate_controlled', 'awkward_moving', 'tracked_2', 'sequences_2', 'tracked_3', 'sequences_3'])
+    'rate_controlled', 'awkward_moving', 'tracked_2', 'sequences_2', 'tracked_3', 'sequences_3', 'presence_7'])
     inPage(`${name}: what is on the graphics card, frame by frame, is what the native decoder decodes`, async (page) => {
         assert.deepEqual(await page.evaluate((src) => test.playAll({ src }), `/as-is/${name}.htvm`), await digests(name));
         assert.deepEqual(await page.evaluate(() => test.events), ['loadedmetadata', 'seeked', 'play', 'pause', 'ended']);

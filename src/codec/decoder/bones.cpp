@@ -41,7 +41,7 @@ void show_animated(DecoderState& state, const AnimatedFrame& frame) {
     show(state,
          {frame.positions, mesh.triangles, mesh.colours, frame.normals, mesh.texcoords, &state.reference->textured,
           presence},
-         topology_of_present(state, state.reference_topology, presence), moved_pose(state, frame.transforms));
+         state.reference_topology, moved_pose(state, frame.transforms));
 }
 
 const Codebook* named(const std::optional<NumberedCodebook>& codebook, std::uint32_t number) {

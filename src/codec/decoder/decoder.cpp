@@ -51,11 +51,11 @@ void repeat(std::span<const std::uint32_t> copied, Values& values) {
     for (const auto v : copied) values.push_back(values[v]);
 }
 
-}  // namespace
-
+// The topology number for what is there of a reference: the reference's own where all of it is, and that of the frame
+// before where that had the same triangles.
 std::uint32_t topology_of_present(DecoderState& state, std::uint32_t reference_topology,
                                   std::span<const std::uint8_t> presence) {
-    if (!anything_absent(presence)) return reference_topology;
+    if (presence.empty()) return reference_topology;
     auto& last = state.shown_presence;
     if (last.reference_topology == reference_topology && std::ranges::equal(last.presence, presence))
         return last.topology;
@@ -63,28 +63,35 @@ std::uint32_t topology_of_present(DecoderState& state, std::uint32_t reference_t
     return last.topology;
 }
 
-void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topology, Pose pose) {
+// Leaves those triangles that are there, and says which vertices are.
+void show_part(ShownFrame& shown, const TexturedSurface* textured, std::span<const std::uint8_t> presence) {
+    shown.presence.assign(presence.begin(), presence.end());
+    if (textured) repeat(textured->copied, shown.presence);
+    if (presence.empty()) return;
+    triangles_shown(shown.triangles, shown.presence, shown.own_triangles);
+    shown.triangles = shown.own_triangles;
+}
+
+}  // namespace
+
+void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t reference_topology, Pose pose) {
     const auto& lattice = state.header->lattice;
     const auto* textured = mesh.textured && !mesh.textured->empty() ? mesh.textured : nullptr;
+    const auto presence = anything_absent(mesh.presence) ? mesh.presence : std::span<const std::uint8_t>();
     auto& shown = state.shown;
     shown.topology = 0;
     to_millimetres(mesh.positions, lattice, shown.positions);
     to_unit_normals(mesh.normals, shown.normals);
-    if (shown.texcoords_topology != topology) {
+    if (shown.texcoords_topology != reference_topology) {
         shown.texcoords_topology = 0;
         if (textured)
             to_texcoords(textured->texcoords, chart_texcoord_unit, shown.texcoords);
         else
             to_texcoords(mesh.texcoords, captured_texcoord_unit, shown.texcoords);
-        shown.texcoords_topology = topology;
+        shown.texcoords_topology = reference_topology;
     }
     shown.triangles = textured ? textured->triangles : mesh.triangles;
-    if (anything_absent(mesh.presence)) {
-        Presence present(mesh.presence.begin(), mesh.presence.end());
-        if (textured) repeat(textured->copied, present);
-        triangles_shown(shown.triangles, present, shown.own_triangles);
-        shown.triangles = shown.own_triangles;
-    }
+    show_part(shown, textured, presence);
     shown.colours = mesh.colours;
     if (textured) {
         repeat(textured->copied, shown.positions);
@@ -96,7 +103,8 @@ void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topolo
         }
     }
     shown.pose = std::move(pose);
-    shown.topology = topology;
+    shown.reference_topology = reference_topology;
+    shown.topology = topology_of_present(state, reference_topology, presence);
 }
 
 Result<TexturedSurface> read_charts(const DecoderState& state, const FramePayloadView& payload, const LatticeMesh& mesh,
@@ -274,6 +282,8 @@ FrameView lend(const ShownFrame& shown, const FrameInfo& info) {
     out.info.vertices = static_cast<std::uint32_t>(shown.positions.size());
     out.info.triangles = static_cast<std::uint32_t>(shown.triangles.size());
     out.topology = shown.topology;
+    out.reference_topology = shown.reference_topology;
+    out.presence = shown.presence;
     out.mesh = {shown.positions, shown.triangles, shown.colours, shown.normals, shown.texcoords};
     out.pose = &shown.pose;
     return out;
@@ -316,7 +326,9 @@ tl::unexpected<Error> out_of_memory_at(const Packet& packet) {
 }  // namespace
 
 DecodedFrame copy_of(const FrameView& frame) {
-    return {frame.info, frame.topology, copy_of(frame.mesh), *frame.pose, frame.concealed};
+    return {
+        frame.info,          frame.topology, frame.reference_topology, {frame.presence.begin(), frame.presence.end()},
+        copy_of(frame.mesh), *frame.pose,    frame.concealed};
 }
 
 Decoder::Decoder(const DecoderOptions& options) : state_(std::make_unique<State>()) {

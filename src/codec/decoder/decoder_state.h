@@ -42,15 +42,17 @@ inline LatticeMeshView view_of(const Reference& reference) {
 // The frame decoded last, in millimetres. Arrays are reused from frame to frame; triangles and colours stay where they
 // were decoded.
 struct ShownFrame {
-    std::uint32_t topology = 0;  // 0: there is none
+    std::uint32_t topology = 0;            // 0: there is none
+    std::uint32_t reference_topology = 0;  // of the mesh of which it may be a part
     std::vector<Vector3f> positions;
     std::vector<Vector3f> normals;
     std::vector<Vector2f> texcoords;
-    std::uint32_t texcoords_topology = 0;  // topology number of the frame they belong to
+    std::uint32_t texcoords_topology = 0;  // reference_topology of the frame they belong to
     std::span<const Triangle> triangles;
     std::span<const Colour> colours;
     std::vector<Colour> own_colours;      // where vertices are repeated
     std::vector<Triangle> own_triangles;  // where some are not there
+    Presence presence;                    // one per vertex; none: all are there
     LatticeMesh own;                      // the mesh of a frame that shares nothing with its reference
     Pose pose;
 };
@@ -121,14 +123,10 @@ inline std::uint32_t new_topology(DecoderState& state) {
     return state.topologies;
 }
 
-// The topology number for what is there of a reference: the reference's own where all of it is, and that of the frame
-// before where that had the same triangles.
-std::uint32_t topology_of_present(DecoderState& state, std::uint32_t reference_topology,
-                                  std::span<const std::uint8_t> presence);
-
-// Makes this the mesh that is shown. The mesh is not copied: if the object is moved later, its arrays must stay in
-// place, as those of a std::vector do. Throws only std::bad_alloc; then nothing is shown.
-void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topology, Pose pose);
+// Makes this the mesh that is shown, or what is there of it. reference_topology: of the whole mesh. The mesh is not
+// copied: if the object is moved later, its arrays must stay in place, as those of a std::vector do. Throws only
+// std::bad_alloc; then nothing is shown.
+void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t reference_topology, Pose pose);
 
 // The mesh with the charts of the frame's layer; nothing if the stream or an I-frame has none. before: the coordinates
 // of the first triangles, which a TP-frame keeps.

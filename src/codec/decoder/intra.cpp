@@ -48,7 +48,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
                                     {.bones = false, .nodes = false}, state.threads);
     if (!reference) return tl::unexpected(reference.error());
     derive_hierarchy(*reference, header);
-    show(state, view_of(*reference), topology_of_present(state, topology, reference->presence), std::move(shown));
+    show(state, view_of(*reference), topology, std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*reference);
     state.reference_topology = topology;

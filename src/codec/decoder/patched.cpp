@@ -56,7 +56,7 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
                                   {.bones = false, .nodes = false}, state.threads);
     if (!renewed) return tl::unexpected(renewed.error());
     if (!derives_for_itself) derive_hierarchy(*renewed, header);
-    show(state, view_of(*renewed), topology_of_present(state, topology, renewed->presence), std::move(shown));
+    show(state, view_of(*renewed), topology, std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*renewed);
     state.reference_topology = topology;

@@ -40,7 +40,7 @@ void show_tracked(DecoderState& state, const DecodedTrackedFrame& frame, Pose po
     show(state,
          {frame.positions, mesh.triangles, frame.colours, frame.normals, mesh.texcoords, &state.reference->textured,
           frame.state.presence},
-         topology_of_present(state, state.reference_topology, frame.state.presence), std::move(pose));
+         state.reference_topology, std::move(pose));
 }
 
 // Shows a frame that is decoded, and remembers it to be shown again. Throws only std::bad_alloc.

@@ -67,6 +67,11 @@ export interface Frame {
     bytes: number;
     /** Frames of one decoder with the same number have the same triangles and texture coordinates. */
     topology: number;
+    /**
+     * Frames of one decoder with the same number have the same vertices at the same places, and the same texture coordinates.
+     * Those that show a part of that mesh have topologies of their own: their triangles are those whose three vertices are there.
+     */
+    referenceTopology: number;
     concealed: boolean;
     /** Millimetres, 3 a vertex. */
     positions: Float32Array;
@@ -78,6 +83,11 @@ export interface Frame {
     normals: Float32Array | null;
     /** 2 a vertex. */
     texcoords: Float32Array | null;
+    /**
+     * 1 a vertex: 1, or 0 where it is not there. No triangle names such a vertex, and its position is a guess at what nobody saw.
+     * Null: all are there.
+     */
+    presence: Uint8Array | null;
 }
 
 /**
@@ -382,6 +392,7 @@ export class Decoder {
             triangles: view.triangles,
             bytes: info.bytes,
             topology: view.topology,
+            referenceTopology: info.reference_topology,
             concealed: info.concealed !== 0,
             positions: floats(view.positions, 3),
             indices:
@@ -389,6 +400,7 @@ export class Decoder {
             colours: view.colours === 0 ? null : new Uint8Array(module.buffer, view.colours, 3 * view.vertices),
             normals: view.normals === 0 ? null : floats(view.normals, 3),
             texcoords: view.texcoords === 0 ? null : floats(view.texcoords, 2),
+            presence: view.presence === 0 ? null : new Uint8Array(module.buffer, view.presence, view.vertices),
         };
     }
 

@@ -47,7 +47,8 @@ export class Display {
     #orbit: Orbit | null = null;
     #look: Look = { lit: false, dark: false, floorVisible: true, follows: true, below: 0, up: { axis: 'y', floor: null } };
     #shows = false; // a frame of this stream
-    #texcoords: Float32Array | null = null; // of the topology that is shown
+    #texcoords: Float32Array | null = null; // of the reference that is shown
+    #reference = -1; // its topology
     #contextLost = false;
     #resized = new ResizeObserver(() => this.#resize());
 
@@ -90,7 +91,8 @@ export class Display {
     setFrame(frame: FrameReport, picture: DecodedPicture | null, hasPicture: boolean): void {
         const scene = this.#stage();
         scene.setFrame(frame, picture, hasPicture);
-        if (frame.indices) this.#texcoords = frame.texcoords;
+        if (frame.texcoords || frame.referenceTopology !== this.#reference) this.#texcoords = frame.texcoords;
+        this.#reference = frame.referenceTopology;
         if (this.#shows) return;
         this.#shows = true;
         this.resetView();
@@ -110,6 +112,7 @@ export class Display {
 
     /** The next frame has its triangles with it. */
     forgetTopology(): void {
+        this.#reference = -1;
         this.#scene?.mesh.forgetTopology();
     }
 

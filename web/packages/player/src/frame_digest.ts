@@ -3,7 +3,7 @@ import { crc32 } from '@htvm/decoder';
 import type { BufferGeometry } from 'three';
 import type { FrameReport } from './messages.js';
 
-/** texcoords: those of the frame's topology, if the stream has any. */
+/** texcoords: those of the frame's reference topology, if the stream has any. */
 export function digestOf(frame: FrameReport, geometry: BufferGeometry, texcoords: Float32Array | null): number {
     if (frame.buffer.byteLength === 0) throw new Error('this frame is not shown any more');
     const part = (array: ArrayBufferView, bytes: number): Uint8Array => new Uint8Array(array.buffer, array.byteOffset, bytes);

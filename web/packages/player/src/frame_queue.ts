@@ -180,12 +180,11 @@ export class FrameQueue {
         return null;
     }
 
-    // Skips a frame because the next is due already; the next takes over its triangles if it needs them.
+    // Skips a frame because the next is due already; the next takes over what it has for both.
     #passOver(frame: FrameReport, next: FrameReport): void {
-        if (frame.indices && !next.indices && next.topology === frame.topology) {
-            next.indices = frame.indices;
+        if (frame.indices && !next.indices && next.topology === frame.topology) next.indices = frame.indices;
+        if (frame.texcoords && !next.texcoords && next.referenceTopology === frame.referenceTopology)
             next.texcoords = frame.texcoords;
-        }
         this.#done(frame);
     }
 

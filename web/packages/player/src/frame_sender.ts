@@ -15,6 +15,7 @@ export class FrameSender {
     #spare: ArrayBuffer[] = [];
     #sums = new Float32Array(0);
     #sentTopology = -1;
+    #sentReference = -1;
 
     constructor(post: (report: Report, transfer?: Transferable[]) => void) {
         this.#post = post;
@@ -26,7 +27,7 @@ export class FrameSender {
 
     /** The next frame has its triangles with it, whatever was sent before. */
     forgetTopology(): void {
-        this.#sentTopology = -1;
+        this.#sentTopology = this.#sentReference = -1;
     }
 
     /** Memory of a frame that the page is done with. */
@@ -63,12 +64,14 @@ export class FrameSender {
         }
         const newTopology = frame.topology !== this.#sentTopology;
         this.#sentTopology = frame.topology;
+        const newReference = frame.referenceTopology !== this.#sentReference;
+        this.#sentReference = frame.referenceTopology;
         const indices = newTopology ? frame.indices.slice() : null;
-        const texcoords = newTopology && frame.texcoords ? frame.texcoords.slice() : null;
-        const { kind, letter, frame: number, topology, triangles, bytes } = frame;
+        const texcoords = newReference && frame.texcoords ? frame.texcoords.slice() : null;
+        const { kind, letter, frame: number, topology, referenceTopology, triangles, bytes } = frame;
         const report: FrameReport = {
-            type: 'frame', ...context, kind, letter, frame: number, topology, vertices, triangles, bytes,
-            bounds: boundsOf(positions), buffer, positions, colours, normals, streamNormals: frame.normals !== null, indices,
+            type: 'frame', ...context, kind, letter, frame: number, topology, referenceTopology, vertices, triangles, bytes,
+            bounds: boundsOf(positions, frame.presence), buffer, positions, colours, normals, streamNormals: frame.normals !== null, indices,
             texcoords, layers: decoder.layerBytes(),
         };
         const transfer: Transferable[] = [buffer];
@@ -90,13 +93,16 @@ export class FrameSender {
     }
 }
 
-function boundsOf(positions: Float32Array): FrameReport['bounds'] {
+// What is not there moves on unseen, and may be anywhere.
+function boundsOf(positions: Float32Array, presence: Uint8Array | null): FrameReport['bounds'] {
     const bounds: FrameReport['bounds'] = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-    for (let i = 0; i < positions.length; i += 3)
+    for (let i = 0, v = 0; i < positions.length; i += 3, ++v) {
+        if (presence && presence[v] === 0) continue;
         for (let c = 0; c < 3; ++c) {
             const value = positions[i + c]!;
             if (value < bounds[c]!) bounds[c] = value;
             if (value > bounds[c + 3]!) bounds[c + 3] = value;
         }
+    }
     return bounds;
 }

@@ -100,12 +100,13 @@ export interface FrameReport {
     /** Null for files. */
     live: LiveTimes | null;
     topology: number;
+    referenceTopology: number;
     vertices: number;
     triangles: number;
     bytes: number;
     layers: number[];
     decodeMs: number;
-    /** Least and largest corner of a box around the mesh, mm. */
+    /** Least and largest corner of a box around the vertices that are there, mm. */
     bounds: [number, number, number, number, number, number];
     buffer: ArrayBuffer;
     positions: Float32Array;
@@ -116,6 +117,7 @@ export interface FrameReport {
     streamNormals: boolean;
     /** Null where the frame before of the same serial had the same topology. */
     indices: Uint32Array | null;
+    /** Null where there are none, and where the frame before of the same serial had the same reference topology. */
     texcoords: Float32Array | null;
     /** Set by the page. Number of the texture picture to be shown with it; null: there is none; undefined: not known yet. */
     picture?: number | null;

@@ -51,7 +51,7 @@ export class StageScene {
     #unlitPicture: Material = pictured(new MeshBasicMaterial(), this.mesh.map);
     #litPicture: Material = pictured(new MeshLambertMaterial(), this.mesh.map);
     #hasPicture = false; // on the graphics card
-    #pictureTopology = -1; // of the mesh that it was shown on
+    #pictureReference = -1; // reference topology of the mesh that it was shown on
     #pictured = false; // whether the frame shows it
     #coloured = true;
     #clayMaterial: Material = new MeshLambertMaterial({ color: 0xb9b2a8 });
@@ -120,12 +120,12 @@ export class StageScene {
             picture.image.close();
         }
         if (picture) this.#hasPicture = true;
-        if (hasPicture) this.#pictureTopology = frame.topology;
-        const stays = hasPicture || (frame.picture != null && frame.topology === this.#pictureTopology);
+        if (hasPicture) this.#pictureReference = frame.referenceTopology;
+        const stays = hasPicture || (frame.picture != null && frame.referenceTopology === this.#pictureReference);
         this.#pictured = this.#hasPicture && stays && this.mesh.geometry.hasAttribute('uv');
         this.#coloured = frame.colours !== null;
         this.#chooseMaterial();
-        if (frame.vertices > 0) {
+        if (frame.bounds[0] <= frame.bounds[3]) {
             const box = this.#uprightBox(frame.bounds);
             if (!this.#bounds) this.#standOnFloor(box);
             this.#shadow.moveOver(box.translate(this.#stage.position), this.#upright.quaternion, this.#stage.position);

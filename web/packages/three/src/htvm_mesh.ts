@@ -10,6 +10,8 @@ export interface MeshFrame {
     triangles: number;
     /** Frames with the same number have the same triangles and texture coordinates: those are uploaded once. */
     topology: number;
+    /** Frames with the same number have the same texture coordinates, which are uploaded once. Not given: the topology. */
+    referenceTopology?: number;
     /** Millimetres, 3 a vertex. */
     positions: Float32Array;
     /** 3 a triangle. Null where the last frame shown had the same topology. */
@@ -18,7 +20,7 @@ export interface MeshFrame {
     colours: Uint8Array | null;
     /** 3 a vertex, or of bytes 4 a vertex with 127 for 1. */
     normals: Float32Array | Int8Array | null;
-    /** 2 a vertex; like indices. */
+    /** 2 a vertex. Null where there are none, and where the last frame shown had the same reference topology. */
     texcoords: Float32Array | null;
 }
 
@@ -32,6 +34,7 @@ export class HtvmMesh extends Mesh<BufferGeometry, Material> {
     /** The picture of a textured stream, for materials that `pictured()` made. */
     readonly map = new PictureMap();
     #topology = -1;
+    #reference = -1;
 
     /** The default material shows vertex colours as they are, unlit. */
     constructor(material: Material = srgbVertexColours(new MeshBasicMaterial({ vertexColors: true }))) {
@@ -61,16 +64,20 @@ export class HtvmMesh extends Mesh<BufferGeometry, Material> {
             if (!frame.indices) throw new Error('a frame of another topology needs its indices');
             this.#topology = frame.topology;
             this.#set('index', frame.indices, 1, 3 * frame.triangles, false);
-            if (frame.texcoords) this.#set('uv', frame.texcoords, 2, frame.vertices, false);
-            else this.#remove('uv');
             this.geometry.setDrawRange(0, 3 * frame.triangles);
             ++this.uploads.indices;
+        }
+        const reference = frame.referenceTopology ?? frame.topology;
+        if (reference !== this.#reference) {
+            this.#reference = reference;
+            if (frame.texcoords) this.#set('uv', frame.texcoords, 2, frame.vertices, false);
+            else this.#remove('uv');
         }
     }
 
     /** Uploads the next frame's triangles whatever its topology number is: for another decoder. */
     forgetTopology(): void {
-        this.#topology = -1;
+        this.#topology = this.#reference = -1;
     }
 
     /** Frees what it holds on the graphics card. */
