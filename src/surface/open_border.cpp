@@ -82,6 +82,8 @@ bool comes_and_goes(std::span<const Vector3f> positions, std::span<const Triangl
     constexpr double open = 0.02;             // share of the vertices on a border
     constexpr double piece = 1.0 / 400;       // of the area: a hand is twice as large, a speck a tenth
     constexpr std::size_t fewest_pieces = 5;  // a person, another one, a chair, a ball are four
+    const auto is_wrong = [&](const Triangle& t) { return std::ranges::max(t) >= positions.size(); };
+    if (std::ranges::any_of(triangles, is_wrong)) return false;
     if (share_on_border(positions, triangles) > open) return true;
     const auto place = places_of(positions);
     DisjointSets pieces(positions.size());

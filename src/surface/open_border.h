@@ -24,7 +24,7 @@ double share_on_border(std::span<const Vector3f> positions, std::span<const Tria
 
 // Whether a capture that begins with this mesh is one of surface that comes and goes: where it has borders, or is in
 // pieces, as what a depth camera sees of a person is even if each piece was closed. Nothing else but people and what
-// they hold comes in so many. positions: of any unit.
+// they hold comes in so many. positions: of any unit. False where triangles name vertices that do not exist.
 bool comes_and_goes(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
 
 }  // namespace htvm::internal

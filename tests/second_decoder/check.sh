@@ -32,7 +32,7 @@ same() {
         *) "$htvm" encode "$input" --unit mm "$@" -o "$work/stream.htvm" >"$work/log" 2>&1 ;;
     esac ||
         { echo "$name: encode $* failed"; cat "$work/log"; exit 1; }
-    "$htvm" decode "$work/stream.htvm" -o "$work/decoded" --unit mm >"$work/log" 2>&1 ||
+    "$htvm" decode "$work/stream.htvm" -o "$work/decoded" --unit mm --all-vertices >"$work/log" 2>&1 ||
         { echo "$name: decode failed"; cat "$work/log"; exit 1; }
     python3 "$here/compare.py" "$work/stream.htvm" "$work/decoded" >"$work/kinds" ||
         { cat "$work/kinds"; echo "$name: $*"; exit 1; }
@@ -42,7 +42,7 @@ same() {
 # stored FILE: decodes a stream with both, compares.
 stored() {
     rm -rf "$work/decoded"
-    "$htvm" decode "$1" -o "$work/decoded" --unit mm >"$work/log" 2>&1 ||
+    "$htvm" decode "$1" -o "$work/decoded" --unit mm --all-vertices >"$work/log" 2>&1 ||
         { echo "$1: decode failed"; cat "$work/log"; exit 1; }
     python3 "$here/compare.py" "$1" "$work/decoded" >"$work/kinds" || { cat "$work/kinds"; exit 1; }
     grep -o " in_part\| predicted\| tracked\| patched" "$work/kinds" >>"$work/all_kinds" || true

@@ -126,5 +126,12 @@ TEST(OpenBorder, SurfaceComesAndGoesWhereItHasBordersOrIsInPieces) {
     EXPECT_FALSE(comes_and_goes(Surface{}));
 }
 
+TEST(OpenBorder, OfAMeshThatNamesVerticesThatDoNotExistNothingIsTold) {
+    auto surface = grid();
+    EXPECT_TRUE(comes_and_goes(surface.positions, surface.triangles));
+    surface.triangles.push_back({0, 1, side * side});
+    EXPECT_FALSE(comes_and_goes(surface.positions, surface.triangles));
+}
+
 }  // namespace
 }  // namespace htvm::internal
