@@ -128,9 +128,9 @@ TEST(OpenBorder, SurfaceComesAndGoesWhereItHasBordersOrIsInPieces) {
 
 TEST(OpenBorder, OfAMeshThatNamesVerticesThatDoNotExistNothingIsTold) {
     auto surface = grid();
-    EXPECT_TRUE(comes_and_goes(surface.positions, surface.triangles));
+    EXPECT_TRUE(comes_and_goes(surface));
     surface.triangles.push_back({0, 1, side * side});
-    EXPECT_FALSE(comes_and_goes(surface.positions, surface.triangles));
+    EXPECT_FALSE(comes_and_goes(surface));
 }
 
 }  // namespace
