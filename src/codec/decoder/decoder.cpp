@@ -57,7 +57,8 @@ std::uint32_t topology_of_present(DecoderState& state, std::uint32_t reference_t
                                   std::span<const std::uint8_t> presence) {
     if (presence.empty()) return reference_topology;
     auto& last = state.shown_presence;
-    if (last.reference_topology == reference_topology && std::ranges::equal(last.presence, presence))
+    if (last.reference_topology == reference_topology &&
+        std::equal(last.presence.begin(), last.presence.end(), presence.begin(), presence.end()))
         return last.topology;
     last = {reference_topology, new_topology(state), Presence(presence.begin(), presence.end())};
     return last.topology;

@@ -90,7 +90,8 @@ Presence code_presence(Coder& coder, const VerticesAround& around, std::span<con
 
 // One bit says that everything is as it was.
 bool is_as_before(std::span<const std::uint8_t> before, std::span<const std::uint8_t> presence) {
-    return std::ranges::equal(before, presence, [](auto was, auto is) { return (was != 0) == (is != 0); });
+    return std::equal(before.begin(), before.end(), presence.begin(), presence.end(),
+                      [](auto was, auto is) { return (was != 0) == (is != 0); });
 }
 
 Presence as_before(std::span<const std::uint8_t> before) {
@@ -156,7 +157,7 @@ Presence presence_of_patched(std::span<const std::uint8_t> presence, std::span<c
 }
 
 bool anything_absent(std::span<const std::uint8_t> presence) {
-    return std::ranges::find(presence, 0) != presence.end();
+    return std::find(presence.begin(), presence.end(), 0) != presence.end();
 }
 
 void triangles_shown(std::span<const Triangle> triangles, std::span<const std::uint8_t> presence,
