@@ -82,7 +82,7 @@ htvm_status describe_current(htvm_decoder& decoder, htvm_frame_info* info, std::
     out.bones = static_cast<std::uint32_t>(frame.pose->orientations.size());
     out.topology = frame.topology;
     out.reference_topology = frame.reference_topology;
-    out.absent = static_cast<std::uint32_t>(std::ranges::count(frame.presence, 0));
+    out.absent = static_cast<std::uint32_t>(std::count(frame.presence.begin(), frame.presence.end(), 0));
     out.concealed = frame.concealed;
     if (!info) return HTVM_OK;
     const auto written = htvm::c_api::write_struct(out, info, info_size);
