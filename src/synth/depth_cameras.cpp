@@ -145,7 +145,8 @@ void draw(View& view, std::uint32_t triangle, const std::array<SeenCorner, 3>& c
     if (std::abs(area) < 1e-9) return;
     const double du = c[1].inverse - c[0].inverse, dv = c[2].inverse - c[0].inverse;
     const double by_x = (du * vy - dv * uy) / area, by_y = (dv * ux - du * vx) / area;
-    const auto [low, high] = std::minmax({c[0].inverse, c[1].inverse, c[2].inverse});
+    const double low = std::min({c[0].inverse, c[1].inverse, c[2].inverse});
+    const double high = std::max({c[0].inverse, c[1].inverse, c[2].inverse});
     const int left = places * view.left, top = places * view.top;
     std::array<RasterPoint, 3> corners;
     for (std::size_t i = 0; i < 3; ++i)
