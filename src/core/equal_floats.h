@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -28,12 +29,15 @@ using FloatsTable = std::unordered_map<std::array<float, N>, std::uint32_t, Floa
 // For each value, the index of the first that equals it.
 template <std::size_t N>
 std::vector<std::uint32_t> first_equal(std::span<const std::array<float, N>> values) {
-    FloatsTable<N> first;
-    first.reserve(values.size());
-    std::vector<std::uint32_t> out;
-    out.reserve(values.size());
-    for (const auto& value : values)
-        out.push_back(first.emplace(value, static_cast<std::uint32_t>(out.size())).first->second);
+    constexpr auto none = std::numeric_limits<std::uint32_t>::max();
+    const std::size_t slots = std::bit_ceil(2 * values.size() + 2);
+    std::vector<std::uint32_t> table(slots, none), out(values.size());
+    for (std::uint32_t i = 0; i < values.size(); ++i) {
+        std::size_t slot = FloatsHash()(values[i]) & (slots - 1);
+        while (table[slot] != none && values[table[slot]] != values[i]) slot = (slot + 1) & (slots - 1);
+        if (table[slot] == none) table[slot] = i;
+        out[i] = table[slot];
+    }
     return out;
 }
 

@@ -1,35 +1,17 @@
 #include "surface/open_border.h"
 
 #include <algorithm>
-#include <bit>
-#include <limits>
 
 #include "core/disjoint_sets.h"
+#include "core/equal_floats.h"
 
 namespace htvm::internal {
 namespace {
-
-constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
 std::uint64_t scattered(std::uint64_t x) {
     x ^= x >> 31;
     x *= 0x9E3779B97F4A7C15u;
     return x ^ (x >> 29);
-}
-
-// Of each vertex the first one at its place.
-std::vector<std::uint32_t> places_of(std::span<const Vector3f> positions) {
-    const std::size_t slots = std::bit_ceil(2 * positions.size() + 2);
-    std::vector<std::uint32_t> table(slots, none), out(positions.size());
-    for (std::uint32_t v = 0; v < positions.size(); ++v) {
-        std::uint64_t hash = 0;
-        for (const float c : positions[v]) hash = scattered(hash * 3 + std::bit_cast<std::uint32_t>(c + 0.0F));
-        std::size_t slot = hash & (slots - 1);
-        while (table[slot] != none && positions[table[slot]] != positions[v]) slot = (slot + 1) & (slots - 1);
-        if (table[slot] == none) table[slot] = v;
-        out[v] = table[slot];
-    }
-    return out;
 }
 
 // The vertices on a border, by place. Around a vertex inside, each side that leads away from it belongs to two
@@ -50,7 +32,7 @@ std::vector<std::uint8_t> on_border(std::span<const Triangle> triangles, std::sp
 }  // namespace
 
 std::vector<std::uint8_t> edges_from_border(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
-    const auto place = places_of(positions);
+    const auto place = first_equal(positions);
     const auto border = on_border(triangles, place);
     std::vector<std::uint8_t> out(positions.size(), far_from_border);
     for (std::size_t v = 0; v < out.size(); ++v)
@@ -66,7 +48,7 @@ std::vector<std::uint8_t> edges_from_border(std::span<const Vector3f> positions,
 }
 
 double share_on_border(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
-    const auto border = on_border(triangles, places_of(positions));
+    const auto border = on_border(triangles, first_equal(positions));
     std::vector<std::uint8_t> used(positions.size(), 0);
     for (const auto& t : triangles)
         for (const auto v : t) used[v] = 1;
@@ -85,7 +67,7 @@ bool comes_and_goes(std::span<const Vector3f> positions, std::span<const Triangl
     const auto is_wrong = [&](const Triangle& t) { return std::ranges::max(t) >= positions.size(); };
     if (std::ranges::any_of(triangles, is_wrong)) return false;
     if (share_on_border(positions, triangles) > open) return true;
-    const auto place = places_of(positions);
+    const auto place = first_equal(positions);
     DisjointSets pieces(positions.size());
     std::vector<double> area(positions.size(), 0);
     double all = 0;

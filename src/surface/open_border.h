@@ -13,9 +13,9 @@ namespace htvm::internal {
 
 inline constexpr std::uint8_t far_from_border = 3;
 
-// Of each vertex, how many edges lead to the nearest border, at most far_from_border; that of vertices of no triangle.
-// Vertices at the same place count as one, so the seams of a texture are no borders; how triangles face does not
-// matter. Linear in vertices and triangles.
+// Says of each vertex how many edges lead to the nearest border, at most far_from_border; that of vertices of no
+// triangle. Vertices at the same place count as one, so the seams of a texture are no borders; how triangles face does
+// not matter. Linear in vertices and triangles.
 std::vector<std::uint8_t> edges_from_border(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
 
 // The share of the vertices that lie on a border, of those that have triangles: next to 0 for captures from all sides,

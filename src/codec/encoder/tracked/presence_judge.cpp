@@ -45,6 +45,9 @@ PresenceHistory first_history(const TrackedPlace& tracked) {
 void fill_new_holes(std::span<const std::uint8_t> seen, const TrackedPlace& tracked, const PresenceHistory& before,
                     const PresenceOptions& options, PresenceHistory& now) {
     const std::size_t vertices = now.shown.size();
+    bool any = false;
+    for (std::size_t v = 0; v < vertices && !any; ++v) any = now.shown[v] == 0 && before.shown[v] != 0;
+    if (!any) return;
     const auto from_border = edges_from_border(points_of(tracked.positions), tracked.triangles);
     DisjointSets holes(vertices);
     for (std::uint32_t v = 0; v < vertices; ++v)

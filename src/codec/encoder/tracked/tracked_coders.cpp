@@ -73,8 +73,8 @@ struct IntraSource {
     bool renewal = false;
 };
 
-// Of the vertices of a coded mesh what is there, from what is of the mesh that it was made of: an intra coder orders
-// vertices as it will, so they are told by their places. Of several at one place, one is enough.
+// Tells which vertices of a coded mesh are there, from what is of the mesh that it was made of: an intra coder orders
+// vertices as it will, so they are told by their places. One of several at a place is enough.
 Presence presence_by_place(const IntraSource& source, const LatticeMesh& coded, std::int32_t step) {
     std::vector<LatticePoint> there;
     for (std::size_t v = 0; v < source.presence.size(); ++v)

@@ -247,8 +247,8 @@ void judge(const FrameSource& source, const MovedSurface& moved, EncodedTrackedF
     out.state.presence = out.presence.shown;
 }
 
-// Of each vertex whether it matters where it lies: what is not shown costs nothing, nor what fills a hole. None: of
-// all.
+// Tells of each vertex whether it matters where it lies: what is not shown costs nothing, nor what fills a hole. None:
+// of all.
 std::vector<std::uint8_t> what_counts(const EncodedTrackedFrame& frame) {
     auto out = frame.state.presence;
     for (std::size_t v = 0; v < std::min(out.size(), frame.seen.size()); ++v)
