@@ -237,9 +237,12 @@ private:
 TEST_F(RecorderTest, WhereOnlyTrackedFramesWereDroppedItGoesOnAtOneThatNeedsNone) {
     options.waiting_bytes = 1000;
     options.sync = 0ms;
-    std::atomic<bool> stuck = true;
+    std::atomic<bool> stuck = true, waited_for = false;
     const WatchedDisk disk([&](const std::string&) {
-        while (stuck) std::this_thread::sleep_for(1ms);
+        while (stuck) {
+            waited_for = true;
+            std::this_thread::sleep_for(1ms);
+        }
     });
     const auto needs_reference = [](PacketKind kind, std::uint32_t frame, std::uint32_t reference) {
         return shared(live_packet(kind, frame, reference, packet_flag::referred | packet_flag::access, 100));
@@ -261,8 +264,11 @@ TEST_F(RecorderTest, WhereOnlyTrackedFramesWereDroppedItGoesOnAtOneThatNeedsNone
         EXPECT_FALSE(record(recorder, tracked(23)));
         EXPECT_TRUE(all_written(recorder, taken + 2));
         // A reference that is not in the file is nothing to go on from.
+        waited_for = false;
         stuck = true;
-        for (std::uint32_t i = 24; i <= 40; ++i) record(recorder, tracked(i));
+        record(recorder, tracked(24));
+        EXPECT_TRUE(soon([&] { return waited_for.load(); }));  // no packet leaves room for another one from here on
+        for (std::uint32_t i = 25; i <= 40; ++i) record(recorder, tracked(i));
         EXPECT_TRUE(record(recorder, needs_reference(PacketKind::patched, 41, 0)));
         stuck = false;
         EXPECT_TRUE(record(recorder, needs_reference(PacketKind::tracked, 42, 41)));
