@@ -39,6 +39,21 @@ namespace Htvm
         Patched = 4,
     }
 
+    // Why an I- or TP-frame was sent where a smaller one might have done.
+    public enum FrameReason : uint
+    {
+        None = 0,    // it is not told, as of the first frame
+        Due = 1,     // the longest key interval has passed, the caller asks for it, or there is nothing to refer to
+        Patches = 2, // whoever joins late would need too many patches
+        Surface = 3, // the reference fits worse than it could, over all the surface
+        Region = 4,  // the reference does not fit in one region, such as a hand
+        Strays = 5,  // too much of the surface is far from the reference
+        Border = 6,  // surface was captured that the reference does not have
+        Texture = 7, // the capture's texture atlas is laid out anew
+        Rate = 8,    // a frame that refers to another would take more bits
+        Cut = 9,     // the picture would fall apart: a cut, or another person
+    }
+
     [Flags]
     public enum Attributes : uint
     {
@@ -86,6 +101,8 @@ namespace Htvm
         public uint Sequence;
         public uint ReferenceTopology; // frames with the same have the same vertices at the same places
         public uint Absent;            // how many vertices are not there
+        public FrameReason Reason;
+        public uint Reserved;
     }
 
     // Arrays on loan until the next frame; IntPtr.Zero where the frame does not have the attribute.

@@ -18,6 +18,15 @@ void for_each_part(const LayerBytes& bytes, const Visit& visit) {
     visit("overhead", bytes.overhead);
 }
 
+// The reasons that are told of any of these frames: visit(name, frames).
+template <class Visit>
+void for_each_reason(const LayerTotals& totals, const Visit& visit) {
+    for (const auto& reason : frame_reasons)
+        if (const auto frames = totals.reasons[static_cast<std::size_t>(reason.reason)];
+            frames > 0 && reason.reason != FrameReason::none)
+            visit(reason.name, frames);
+}
+
 std::string key_of(std::string name) {
     std::replace(name.begin(), name.end(), ' ', '_');
     return name;
@@ -29,12 +38,14 @@ void add(LayerTotals& totals, const FrameInfo& info) {
     ++totals.frames;
     totals.source_vertices += info.source_vertices;
     totals.bytes += info.bytes;
+    ++totals.reasons[static_cast<std::size_t>(info.reason)];
 }
 
 void add(LayerTotals& totals, const LayerTotals& others) {
     totals.frames += others.frames;
     totals.source_vertices += others.source_vertices;
     totals.bytes += others.bytes;
+    for (std::size_t i = 0; i < totals.reasons.size(); ++i) totals.reasons[i] += others.reasons[i];
 }
 
 void add(TotalsByType& totals, const FrameInfo& info) { add(totals.of(info.type), info); }
@@ -85,6 +96,26 @@ std::string layer_table(const TotalsByType& totals) {
     return out;
 }
 
+std::string reasons_text(const TotalsByType& totals) {
+    std::string out;
+    for (const auto& kind : frame_kinds) {
+        std::string reasons;
+        for_each_reason(totals.of(kind.type), [&](const char* name, std::size_t frames) {
+            reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", frames, name);
+        });
+        if (!reasons.empty()) out += fmt::format("{}why {}: {}", out.empty() ? "" : "; ", kind.letter, reasons);
+    }
+    return out.empty() ? out : out + "\n";
+}
+
+nlohmann::json reasons_json(const TotalsByType& totals) {
+    auto out = nlohmann::json::object();
+    for (const auto& kind : frame_kinds)
+        for_each_reason(totals.of(kind.type),
+                        [&](const char* name, std::size_t frames) { out[kind.letter][name] = frames; });
+    return out;
+}
+
 nlohmann::json layers_json(const LayerBytes& bytes) {
     nlohmann::json out;
     for_each_part(bytes, [&](const char* name, std::size_t part) { out[key_of(name)] = part; });
@@ -110,6 +141,7 @@ nlohmann::json frame_json(const FrameInfo& info) {
                           {"triangles", info.triangles},
                           {"bytes", layers_json(info.bytes)},
                           {"bits_per_vertex", bits_per_vertex(info.bytes.total(), info.source_vertices)}};
+    if (info.reason != FrameReason::none) out["reason"] = name_of(info.reason);
     if (info.group > 1) out["group"] = {{"frames", info.group}, {"place", info.place}};
     return out;
 }

@@ -1,4 +1,5 @@
-// How the bytes of a sequence are distributed over layers, summed over frames, as text and as JSON.
+// How the bytes of a sequence are distributed over layers, summed over frames, and why its I- and TP-frames were sent,
+// as text and as JSON.
 #pragma once
 
 #include <array>
@@ -14,6 +15,7 @@ struct LayerTotals {
     std::size_t frames = 0;
     std::uint64_t source_vertices = 0;  // the "v" of bits per vertex: vertices of the captured meshes
     LayerBytes bytes;
+    std::array<std::size_t, frame_reasons.size()> reasons{};  // how many frames each has
 };
 
 void add(LayerTotals& totals, const FrameInfo& info);
@@ -34,6 +36,11 @@ double bits_per_vertex(std::size_t bytes, std::uint64_t vertices);
 
 // A table of bits per vertex by layer, one line per kind of frame and one for all, and the layers' shares of all bytes.
 std::string layer_table(const TotalsByType& totals);
+
+// "why I: 2 due, 1 region; why TP: 7 border" and the end of the line; nothing if no frame has a reason.
+std::string reasons_text(const TotalsByType& totals);
+// The same numbers by letter and name: {"I": {"due": 2, "region": 1}, "TP": {"border": 7}}.
+nlohmann::json reasons_json(const TotalsByType& totals);
 
 nlohmann::json layers_json(const LayerBytes& bytes);
 // The inverse; throws as nlohmann-json does if a layer is missing or not a number.

@@ -76,6 +76,7 @@ void report(const EncodePlan& plan, const Summary& summary, const RateReport& ra
         nlohmann::json out = {{"output", plan.output.place},
                               {"bytes", bytes},
                               {"frames", json_of(summary.list)},
+                              {"reasons", reasons_json(summary.totals)},
                               {"left_out_frames", summary.left_out},
                               {"repeated_frames", summary.repeated},
                               {"missing_frames", summary.missing},
@@ -89,7 +90,7 @@ void report(const EncodePlan& plan, const Summary& summary, const RateReport& ra
         if (deadline) out["pace"] = deadline_json(*deadline);
         fmt::print("{}\n", out.dump(2));
     } else {
-        tell(layer_table(summary.totals));
+        tell(layer_table(summary.totals) + reasons_text(summary.totals));
         note(fmt::format("{}: {}, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s",
                          shown_place(plan.output.place), counted(frames, "frame"), bytes, megabits / seconds, fps,
                          static_cast<double>(frames) / summary.encode_seconds));

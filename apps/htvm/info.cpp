@@ -75,7 +75,7 @@ void print_frame(const FrameInfo& f, bool start) {
     const auto& b = f.bytes;
     fmt::print(
         "{:>6} {:>4} {:>6} {:>10.3f} {:>8} {:>9} {:>9} {:>15.3f} {:>8.3f} {:>8.3f} {:>17.3f} {:>8.3f} {:>8.3f} "
-        "{:>14.3f} {:>22.3f} {:>8.3f}\n",
+        "{:>14.3f} {:>22.3f} {:>8.3f}{}\n",
         f.frame,
         std::string(kind_of(f.type).letter) + (f.group > 1 ? fmt::format("{}/{}", f.place, f.group) : "") +
             (start && f.type != FrameType::intra && f.type != FrameType::patched ? "*" : ""),
@@ -83,7 +83,8 @@ void print_frame(const FrameInfo& f, bool start) {
         bpv(b[Layer::pose] + b[Layer::transforms]), bpv(b[Layer::geometry] + b[Layer::external_intra]),
         bpv(b[Layer::colour]), bpv(b[Layer::normals] + b[Layer::texcoords]), bpv(b[Layer::mapping]),
         bpv(b[Layer::fans]), bpv(b[Layer::distance_orders]),
-        bpv(b[Layer::tracked] + b[Layer::removed] + b[Layer::border]), bpv(b.total()));
+        bpv(b[Layer::tracked] + b[Layer::removed] + b[Layer::border]), bpv(b.total()),
+        f.reason == FrameReason::none ? "" : fmt::format(" {:>7}", name_of(f.reason)));
 }
 
 const char* axis_name(UpAxis up) { return up == UpAxis::unknown ? "unknown" : word_of(up, up_axes); }
@@ -303,9 +304,10 @@ struct Inspection {
 };
 
 void print_heading() {
-    fmt::print("{:>6} {:>4} {:>6} {:>10} {:>8} {:>9} {:>9} {:>15} {:>8} {:>8} {:>17} {:>8} {:>8} {:>14} {:>22} {:>8}\n",
-               "frame", "type", "ref", "time s", "vertices", "triangles", "bytes", "pose/transforms", "geometry",
-               "colour", "normals/texcoords", "mapping", "fans", "distance order", "tracked/removed/border", "bpv");
+    fmt::print(
+        "{:>6} {:>4} {:>6} {:>10} {:>8} {:>9} {:>9} {:>15} {:>8} {:>8} {:>17} {:>8} {:>8} {:>14} {:>22} {:>8} {:>7}\n",
+        "frame", "type", "ref", "time s", "vertices", "triangles", "bytes", "pose/transforms", "geometry", "colour",
+        "normals/texcoords", "mapping", "fans", "distance order", "tracked/removed/border", "bpv", "why");
 }
 
 Result<void> take_header(Inspection& in, const Packet& packet) {
@@ -413,6 +415,7 @@ void print_json(const Inspection& in, const StreamInput& input) {
     nlohmann::json out{{"sequence", sequence_json(sequence)},
                        {"sequences", found.sequence_list},
                        {"frames", found.frame_list},
+                       {"reasons", reasons_json(found.totals)},
                        {"bytes", found.bytes},
                        {"bytes_outside_frames", size.bytes_outside_frames},
                        {"audio", audio_json(found.audio)},
@@ -449,9 +452,10 @@ void print_totals(const Inspection& in) {
     if (patched.patched > 0)
         fmt::print("patches in {} replace {:.2f} % of the surface a T- or TP-frame on average, at most {:.1f} %\n",
                    counted(patched.patched, "TP-frame"), 100 * patched.mean(), 100 * patched.largest);
-    fmt::print("{}{} in {:.2f} s, {} bytes ({} outside frames), {:.2f} Mbit/s{}\n", layer_table(found.totals),
-               counted(found.frames, "frame"), size.seconds, found.bytes, size.bytes_outside_frames,
-               size.megabits_per_second, found.has_index ? ", with an index for seeking" : "");
+    fmt::print("{}{}{} in {:.2f} s, {} bytes ({} outside frames), {:.2f} Mbit/s{}\n", layer_table(found.totals),
+               reasons_text(found.totals), counted(found.frames, "frame"), size.seconds, found.bytes,
+               size.bytes_outside_frames, size.megabits_per_second,
+               found.has_index ? ", with an index for seeking" : "");
 }
 
 Result<void> info(const Options& options) {
@@ -473,6 +477,14 @@ Result<void> info(const Options& options) {
         print_totals(in);
     if (auto whole = check_whole(*input, options.input); !whole) return whole;
     return in.buffer ? check_buffer(options, *in.buffer) : Result<void>();
+}
+
+// What each word of the last column means.
+std::string reasons_help() {
+    std::string out = "The last column and the counts below say why an I- or TP-frame was sent:";
+    for (const auto& [reason, name, meaning] : frame_reasons)
+        if (reason != FrameReason::none) out += fmt::format("\n  {:<8} {}", name, meaning);
+    return out;
 }
 
 }  // namespace
@@ -506,7 +518,8 @@ void add_info(CLI::App& app, Run& run) {
         "and the other columns are the patch's; bpv is the frame's total, with packet and layer headers, counts and\n"
         "ends of runs (overhead, below). All in bits per vertex of the captured mesh.\n"
         "T-frames are decoded to tell their parts; one that cannot be counts as overhead.\n"
-        "Decoded positions lie on the lattice; the step of the quality (encode -q) is coarser.");
+        "Decoded positions lie on the lattice; the step of the quality (encode -q) is coarser.\n" +
+        reasons_help());
     command->callback([options, &run] { run = [options] { return info(*options); }; });
 }
 

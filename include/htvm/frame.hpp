@@ -1,4 +1,4 @@
-// What encoder and decoder report about a frame: its type, and how its bytes are distributed.
+// What encoder and decoder report about a frame: its type, why it was sent, and how its bytes are distributed.
 #pragma once
 
 #include <array>
@@ -58,6 +58,7 @@ enum class Layer : std::uint8_t {
     border = 14,    // where a patch is joined
     charts = 15,    // how triangles lie in the texture's picture
     presence = 16,  // which vertices are there
+    reason = 17,    // why the encoder sent the frame: a FrameReason
 };
 
 struct LayerName {
@@ -81,6 +82,7 @@ inline constexpr std::array frame_layers = {
     LayerName{Layer::border, "border"},
     LayerName{Layer::charts, "charts"},
     LayerName{Layer::presence, "presence"},
+    LayerName{Layer::reason, "reason"},
 };
 inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // the largest number plus one; 0 is not a layer
 
@@ -99,8 +101,34 @@ struct LayerBytes {
     std::size_t total() const { return std::accumulate(of_layer.begin(), of_layer.end(), overhead); }
 };
 
+// Why the encoder sent an I- or TP-frame where a smaller one might have done. The numbers are those of the stream, in
+// the order of frame_reasons.
+enum class FrameReason : std::uint8_t { none, due, patches, surface, region, strays, border, texture, rate, cut };
+
+struct FrameReasonName {
+    FrameReason reason;
+    const char* name;
+    const char* meaning;
+};
+inline constexpr std::array frame_reasons = {
+    FrameReasonName{FrameReason::none, "none", "it is not told, as of the first frame"},
+    FrameReasonName{FrameReason::due, "due",
+                    "the longest key interval has passed, the caller asks for it, or there is nothing to refer to"},
+    FrameReasonName{FrameReason::patches, "patches", "whoever joins late would need too many patches"},
+    FrameReasonName{FrameReason::surface, "surface", "the reference fits worse than it could, over all the surface"},
+    FrameReasonName{FrameReason::region, "region", "the reference does not fit in one region, such as a hand"},
+    FrameReasonName{FrameReason::strays, "strays", "too much of the surface is far from the reference"},
+    FrameReasonName{FrameReason::border, "border", "surface was captured that the reference does not have"},
+    FrameReasonName{FrameReason::texture, "texture", "the capture's texture atlas is laid out anew"},
+    FrameReasonName{FrameReason::rate, "rate", "a frame that refers to another would take more bits"},
+    FrameReasonName{FrameReason::cut, "cut", "the picture would fall apart: a cut, or another person"},
+};
+
+constexpr const char* name_of(FrameReason reason) { return frame_reasons[static_cast<std::size_t>(reason)].name; }
+
 struct FrameInfo {
     FrameType type = FrameType::intra;
+    FrameReason reason = FrameReason::none;  // of an I- or TP-frame
     std::uint32_t frame = 0;
     std::uint32_t reference = 0;  // number of the frame it refers to; for a T-frame the reference or the previous frame
     std::uint32_t sequence = 0;   // of a decoded frame: SequenceInfo::ordinal

@@ -114,6 +114,25 @@ enum {
 const char* htvm_frame_kind_name(uint32_t type);
 const char* htvm_frame_kind_letter(uint32_t type);
 
+/* why the encoder sent an I- or TP-frame where a smaller one might have done */
+enum {
+    HTVM_REASON_NONE = 0,    /* it is not told, as of the first frame */
+    HTVM_REASON_DUE = 1,     /* the longest key interval has passed, the caller asks for it, or there is nothing to
+                              * refer to */
+    HTVM_REASON_PATCHES = 2, /* whoever joins late would need too many patches */
+    HTVM_REASON_SURFACE = 3, /* the reference fits worse than it could, over all the surface */
+    HTVM_REASON_REGION = 4,  /* the reference does not fit in one region, such as a hand */
+    HTVM_REASON_STRAYS = 5,  /* too much of the surface is far from the reference */
+    HTVM_REASON_BORDER = 6,  /* surface was captured that the reference does not have */
+    HTVM_REASON_TEXTURE = 7, /* the capture's texture atlas is laid out anew */
+    HTVM_REASON_RATE = 8,    /* a frame that refers to another would take more bits */
+    HTVM_REASON_CUT = 9,     /* the picture would fall apart: a cut, or another person */
+    HTVM_REASONS = 10        /* number of reasons in this version */
+};
+
+/* Name of a reason: "none", "due", ...; "unknown" for a number that this version does not know. Never NULL. */
+const char* htvm_frame_reason_name(uint32_t reason);
+
 /* attributes of a mesh besides positions: bits */
 enum { HTVM_COLOURS = 1, HTVM_NORMALS = 2, HTVM_TEXCOORDS = 4 };
 
@@ -136,7 +155,9 @@ typedef struct htvm_frame_info {
                                     of the arrays, and the same texture coordinates. It is the topology of a frame that
                                     shows all of the mesh; one that shows a part has another topology, and its triangles
                                     are those whose three vertices are there. 0 from an encoder */
-    uint32_t absent; /* how many vertices are not there, as htvm_mesh_view.presence says; 0 from an encoder */
+    uint32_t absent;   /* how many vertices are not there, as htvm_mesh_view.presence says; 0 from an encoder */
+    uint32_t reason;   /* HTVM_REASON_... */
+    uint32_t reserved; /* 0 */
 } htvm_frame_info;
 
 /* ---- decoder -------------------------------------------------------------------------------------------------- */
@@ -290,7 +311,7 @@ htvm_status htvm_decoder_global_shift(htvm_decoder* decoder, int64_t* shift);
 /* Where the current frame's bytes went: bytes[0] headers, counts and checksums, bytes[n] the layer of number n
  * (docs/bitstream.md, section 4). HTVM_LAYERS numbers are always enough. HTVM_BAD_INPUT: there is no current frame.
  * HTVM_BUFFER_TOO_SMALL below HTVM_LAYERS. */
-enum { HTVM_LAYERS = 17 };
+enum { HTVM_LAYERS = 18 };
 htvm_status htvm_decoder_layer_bytes(htvm_decoder* decoder, uint64_t* bytes, size_t capacity);
 /* What people call layer n: "geometry"; "overhead" for 0. NULL where there is no such layer. */
 const char* htvm_layer_name(uint32_t layer);

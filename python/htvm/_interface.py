@@ -26,6 +26,8 @@ HTVM_OUT_OF_MEMORY = -5
 HTVM_BUFFER_TOO_SMALL = -6
 HTVM_INTERNAL = -7
 
+HTVM_REASON_NONE = 0
+
 HTVM_PACKET_FLAGS_VALID = 128
 HTVM_PACKET_HEADER = 32
 
@@ -94,6 +96,8 @@ class htvm_frame_info(Structure):
         ("sequence", c_uint32),
         ("reference_topology", c_uint32),
         ("absent", c_uint32),
+        ("reason", c_uint32),
+        ("reserved", c_uint32),
     ]
 
 
@@ -210,6 +214,7 @@ functions: dict[str, tuple[Any, list[Any]]] = {
     "htvm_status_text": (c_char_p, [htvm_status]),
     "htvm_frame_kind_name": (c_char_p, [c_uint32]),
     "htvm_frame_kind_letter": (c_char_p, [c_uint32]),
+    "htvm_frame_reason_name": (c_char_p, [c_uint32]),
     "htvm_decoder_options_init": (htvm_status, [POINTER(htvm_decoder_options), c_size_t]),
     "htvm_decoder_create": (htvm_status, [POINTER(htvm_decoder_options), POINTER(htvm_decoder)]),
     "htvm_decoder_destroy": (None, [htvm_decoder]),

@@ -16,6 +16,7 @@ from . import _interface as c
 from .errors import BadInput
 from .mesh import Mesh, as_c_mesh
 from .skeleton import Pose, Skeleton
+from .stream import reason_of
 
 _profiles = {
     "tracked": c.HTVM_PROFILE_TRACKED, "topology": c.HTVM_PROFILE_TOPOLOGY, "paper": c.HTVM_PROFILE_PAPER,
@@ -50,6 +51,7 @@ class EncodedFrame:
     vertices: int  # of the decoded mesh
     triangles: int
     bytes: int
+    reason: Optional[str] = None  # why an I- or TP-frame was sent, as `Frame.reason`
 
 
 def _profile_number(profile: str) -> int:
@@ -270,7 +272,7 @@ class Encoder:
         if c.library.htvm_encoder_last_frame(self._handle, info, ctypes.sizeof(info)) != c.HTVM_OK:
             return None
         kind = c.library.htvm_frame_kind_letter(info.type).decode()
-        return EncodedFrame(info.frame, kind, info.timestamp_us, info.vertices, info.triangles, info.bytes)
+        return EncodedFrame(info.frame, kind, info.timestamp_us, info.vertices, info.triangles, info.bytes, reason_of(info))
 
     def __enter__(self) -> "Encoder":
         return self

@@ -30,6 +30,13 @@ up_axes = {
 }
 
 
+def reason_of(info: c.htvm_frame_info) -> Optional[str]:
+    if info.reason == c.HTVM_REASON_NONE:
+        return None
+    name: bytes = c.library.htvm_frame_reason_name(info.reason)
+    return name.decode()
+
+
 @dataclass(eq=False)
 class Frame(Mesh):
     """A decoded mesh. Its arrays stay as they are when the next frame is decoded.
@@ -43,6 +50,7 @@ class Frame(Mesh):
     number: int = 0  # in the whole stream, from 0
     timestamp_us: int = 0  # microseconds
     kind: str = ""  # "I", "EP", "P", "T" or "TP": docs/glossary.md
+    reason: Optional[str] = None  # why an I- or TP-frame was sent, "due" or "region": docs/bitstream.md, 8.20; None: not told
     bytes: int = 0  # of its packet
     topology: int = 0  # of frames of one iteration, the same if they have the same triangles and texcoords
     reference_topology: int = 0  # likewise, the same if they have the same vertices and texcoords
@@ -313,7 +321,7 @@ class _Decoder:
         self._last = Frame(
             copied(view.positions, n, 3, np.float32), triangles, copied_attribute(view.colours, n, 3, np.uint8),
             copied_attribute(view.normals, n, 3, np.float32), texcoords, number=number,
-            timestamp_us=info.timestamp_us, kind=c.library.htvm_frame_kind_letter(info.type).decode(),
+            timestamp_us=info.timestamp_us, kind=c.library.htvm_frame_kind_letter(info.type).decode(), reason=reason_of(info),
             bytes=info.bytes, topology=info.topology, reference_topology=info.reference_topology,
             presence=copied_presence(view.presence, n), joints=joints, orientations=orientations)
         return self._last

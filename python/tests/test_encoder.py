@@ -28,10 +28,11 @@ def test_an_intra_frame_can_be_asked_for():
     encoder = htvm.Encoder(subject_size=1000)
     encoder.push(sheet(0))
     encoder.push(sheet(1))
-    assert encoder.last_frame.kind == "T"
+    assert encoder.last_frame.kind == "T" and encoder.last_frame.reason is None
     encoder.push(sheet(2), force_intra=True)
     last = encoder.last_frame
     assert (last.number, last.kind, last.timestamp_us) == (2, "I", 66667) and last.bytes > 0
+    assert last.reason == "due"
 
 
 def test_options_have_their_names_with_underscores_for_dots():

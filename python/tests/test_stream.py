@@ -87,6 +87,12 @@ def test_frames_of_a_topology_share_their_triangles_which_cannot_be_written_to(s
     frames[0].copy().triangles[0] = 0
 
 
+def test_a_frame_says_why_it_was_sent():
+    told = {frame.number: (frame.kind, frame.reason) for frame in htvm.open(conformance / "reasons_4.htvm")
+            if frame.kind != "T"}
+    assert told == {0: ("I", None), 2: ("TP", "region"), 4: ("I", "due"), 8: ("I", None)}
+
+
 def test_a_frame_says_which_vertices_are_there():
     frames = list(htvm.open(conformance / "presence_7.htvm"))
     assert {frame.presence is None for frame in frames} == {True, False}

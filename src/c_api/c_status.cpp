@@ -86,6 +86,17 @@ static_assert(HTVM_FRAME_PREDICTED == static_cast<int>(FrameType::predicted));
 static_assert(HTVM_FRAME_TRACKED == static_cast<int>(FrameType::tracked));
 static_assert(HTVM_FRAME_PATCHED == static_cast<int>(FrameType::patched));
 static_assert(HTVM_FRAME_KINDS == frame_type_count);
+static_assert(HTVM_REASON_NONE == static_cast<int>(FrameReason::none));
+static_assert(HTVM_REASON_DUE == static_cast<int>(FrameReason::due));
+static_assert(HTVM_REASON_PATCHES == static_cast<int>(FrameReason::patches));
+static_assert(HTVM_REASON_SURFACE == static_cast<int>(FrameReason::surface));
+static_assert(HTVM_REASON_REGION == static_cast<int>(FrameReason::region));
+static_assert(HTVM_REASON_STRAYS == static_cast<int>(FrameReason::strays));
+static_assert(HTVM_REASON_BORDER == static_cast<int>(FrameReason::border));
+static_assert(HTVM_REASON_TEXTURE == static_cast<int>(FrameReason::texture));
+static_assert(HTVM_REASON_RATE == static_cast<int>(FrameReason::rate));
+static_assert(HTVM_REASON_CUT == static_cast<int>(FrameReason::cut));
+static_assert(HTVM_REASONS == frame_reasons.size());
 
 htvm_frame_info describe(const FrameInfo& info, std::uint32_t attributes) {
     htvm_frame_info out{};
@@ -100,6 +111,7 @@ htvm_frame_info describe(const FrameInfo& info, std::uint32_t attributes) {
     out.vertices = info.vertices;
     out.triangles = info.triangles;
     out.bytes = info.bytes.total();
+    out.reason = static_cast<std::uint32_t>(info.reason);
     return out;
 }
 
@@ -117,6 +129,10 @@ const char* htvm_frame_kind_name(uint32_t type) {
 
 const char* htvm_frame_kind_letter(uint32_t type) {
     return type < htvm::frame_kinds.size() ? htvm::frame_kinds[type].letter : "?";
+}
+
+const char* htvm_frame_reason_name(uint32_t reason) {
+    return reason < htvm::frame_reasons.size() ? htvm::frame_reasons[reason].name : "unknown";
 }
 
 const char* htvm_status_text(htvm_status status) {

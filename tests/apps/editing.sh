@@ -75,6 +75,22 @@ packets walk.htvm | grep -q ' 5 ' && fail "walk.htvm has an index at its end too
 expect 0 "index: 12 frames, 0.40 s, 3 places to start, within" "$htvm" info walk.htvm
 "$htvm" info walk.htvm | head -n 1 | grep -q "^walk.htvm: 30 frames/s" || fail "info does not begin with the file's name"
 expect 0 "bits per captured vertex" "$htvm" info walk.htvm
+
+# I- and TP-frames say why they were sent, but for the first; those of another kind say nothing.
+expect 0 "why I: 2 due" "$htvm" info walk.htvm
+[ "$("$htvm" info walk.htvm | awk '$1 != "why" && $NF == "due" { print $1, $2 }')" = $'4 I\n8 I' ] || fail "info shows other reasons beside the frames"
+expect 0 "$(printf 'why I: 1 due; why TP: 1 region\n')" "$htvm" info "$project/tests/data/conformance/reasons_4.htvm" --summary
+"$htvm" info once.htvm | grep -q "^why" && fail "info explains a stream of one frame"
+for said in "$("$htvm" info walk.htvm --json)" "$("$htvm" encode walk --keyint 4 -o again.htvm --json 2>/dev/null)"; do
+    python3 - "$said" <<'PYTHON' || fail "the reasons are not those of the frames"
+import json, sys
+said = json.loads(sys.argv[1])
+assert said["reasons"] == {"I": {"due": 2}}, said["reasons"]
+assert [frame.get("reason") for frame in said["frames"] if frame["type"] == "I"] == [None, "due", "due"]
+PYTHON
+done
+expect 0 "why I: 2 due" "$htvm" encode walk --keyint 4 -o again.htvm
+
 "$htvm" encode walk --keyint 12 --access-interval 4 -o spaced.htvm 2>/dev/null
 "$htvm" info spaced.htvm >said.txt
 grep -q ' T\* ' said.txt || fail "no T-frame is a place to start"

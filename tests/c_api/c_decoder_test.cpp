@@ -45,6 +45,7 @@ void expect_same_frame(htvm_decoder* decoder, const htvm_frame_info& info, const
     EXPECT_EQ(info.source_triangles, expected.info.source_triangles);
     EXPECT_EQ(info.bytes, expected.info.bytes.total());
     EXPECT_EQ(info.concealed, expected.concealed ? 1u : 0u);
+    EXPECT_EQ(info.reason, static_cast<std::uint32_t>(expected.info.reason));
     EXPECT_EQ(info.topology, expected.topology);
     EXPECT_EQ(info.sequence, expected.info.sequence);
     EXPECT_EQ(info.reference_topology, expected.reference_topology);
@@ -265,6 +266,13 @@ TEST(CDecoder, KindsOfFramesHaveNames) {
     EXPECT_STREQ(htvm_frame_kind_letter(HTVM_FRAME_ENHANCED), "EP");
     EXPECT_STREQ(htvm_frame_kind_name(HTVM_FRAME_KINDS), "unknown");
     EXPECT_STREQ(htvm_frame_kind_letter(0xFFFFFFFF), "?");
+}
+
+TEST(CDecoder, ReasonsOfFramesHaveNames) {
+    for (const auto& reason : frame_reasons)
+        EXPECT_STREQ(htvm_frame_reason_name(static_cast<std::uint32_t>(reason.reason)), reason.name);
+    EXPECT_STREQ(htvm_frame_reason_name(HTVM_REASON_BORDER), "border");
+    EXPECT_STREQ(htvm_frame_reason_name(HTVM_REASONS), "unknown");
 }
 
 TEST(CDecoder, BytesOfLayersAddUpToThoseOfThePacket) {

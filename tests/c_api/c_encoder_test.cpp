@@ -237,6 +237,7 @@ TEST(CEncoder, TellsOfTheLastFrame) {
     ASSERT_EQ(htvm_encoder_send_mesh(encoder.get(), &mesh, nullptr, 8, 1), HTVM_OK);
     ASSERT_EQ(htvm_encoder_last_frame(encoder.get(), &info, sizeof info), HTVM_OK);
     EXPECT_EQ(info.type, std::uint32_t{HTVM_FRAME_INTRA}) << "forced";
+    EXPECT_EQ(info.reason, std::uint32_t{HTVM_REASON_DUE});
 }
 
 TEST(CEncoder, WithLatencyAFrameComesACallLaterAndTheLastOnesAtTheEnd) {

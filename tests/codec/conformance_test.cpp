@@ -332,6 +332,21 @@ void write_charts() {
     write_stream("charts", ball, options);
 }
 
+// I- and TP-frames that say why they were sent, the last of them for a reason that nobody knows.
+void write_reasons() {
+    auto options = patched_options();
+    options.key_interval = 4;
+    auto packets = encode(horned_ball(9), options).packets;
+    const auto last = std::find_if(packets.rbegin(), packets.rend(),
+                                   [](const Packet& packet) { return packet.kind == PacketKind::intra; });
+    ASSERT_EQ(last->frame, 8u);
+    auto payload = copy_of(*read_frame_payload(last->payload));
+    payload.set(Layer::reason, {200});
+    last->payload = write_frame_payload(payload);
+    packets.pop_back();  // the index, which tells where packets lie
+    write_packets("reasons", packets);
+}
+
 // What version 7 brought: frames that say what is there. Of a person with colours and normals, of an open surface with
 // neither, and of meshes without vertices or triangles.
 void write_presence() {
@@ -365,6 +380,7 @@ void write_all() {
     write_grouped();
     write_charts();
     write_presence();
+    write_reasons();
     write_sequences();
 
     TestSequence spokes{"awkward, moving", {}, {}};

@@ -37,7 +37,7 @@ static class Program
                 Console.WriteLine("field {0} {1} {2} {3}", type.Name, field.Name, Marshal.OffsetOf(type, field.Name),
                                   Abi(field.FieldType));
         }
-        foreach (var type in new[] { typeof(Status), typeof(FrameKind), typeof(Attributes), typeof(Up), typeof(Profile) })
+        foreach (var type in new[] { typeof(Status), typeof(FrameKind), typeof(FrameReason), typeof(Attributes), typeof(Up), typeof(Profile) })
             foreach (var value in Enum.GetValues(type))
                 Console.WriteLine("constant {0} {1} {2}", type.Name, value, Convert.ToInt64(value));
         foreach (var method in typeof(Native).GetMethods().Where(m => m.Name.StartsWith("htvm_")))
@@ -302,6 +302,7 @@ static class Program
                 kinds.Add(frames.Info.Type);
                 Require(frames.Info.TimestampUs == 40000 * (kinds.Count - 1), "the timestamp");
                 Require(frames.TopologyChanged == (frames.Info.Type == FrameKind.Intra), "a new topology with each I-frame");
+                Require(frames.Info.Reason == (kinds.Count == 3 ? FrameReason.Due : FrameReason.None), "why it was sent");
                 var joints = new double[6];
                 frames.Decoder.CopyJoints(joints);
                 Require(Math.Abs(joints[4] - 100) < 5 && Math.Abs(joints[1] - 10) < 5, "the joints");

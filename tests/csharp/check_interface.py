@@ -18,7 +18,7 @@ def snake(name):
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
-constant_names = {"Status": "HTVM_{}", "FrameKind": "HTVM_FRAME_{}", "Attributes": "HTVM_{}", "Up": "HTVM_UP_{}",
+constant_names = {"Status": "HTVM_{}", "FrameKind": "HTVM_FRAME_{}", "FrameReason": "HTVM_REASON_{}", "Attributes": "HTVM_{}", "Up": "HTVM_UP_{}",
                   "Profile": "HTVM_PROFILE_{}"}
 
 

@@ -58,7 +58,7 @@ for source in "${decoder[@]}" src/c_api/wasm_traps.cpp src/c_api/wasm_no_system.
     objects+=" $object"
     printf 'build %s: compile %s\n  compiler = clang++\n  flags = %s\n' "$object" "$source" "$browser"
 done
-functions='decoder_[a-z_]+|packet_read|dependencies_[a-z]+|frame_kind_[a-z]+|layer_name|index_read|version|version_string|stream_version|status_text'
+functions='decoder_[a-z_]+|packet_read|dependencies_[a-z]+|frame_kind_[a-z]+|frame_reason_name|layer_name|index_read|version|version_string|stream_version|status_text'
 exports=$(grep -oE "\bhtvm_($functions) ?\(" include/htvm/htvm.h |
     tr -d ' (' | sort -u | sed 's/^/-Wl,--export=/' | tr '\n' ' ')
 printf 'build build/wasm/htvm_decoder.wasm: link%s\n  compiler = clang++\n  flags = %s\n' "$objects" \

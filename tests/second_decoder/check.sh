@@ -119,6 +119,16 @@ done
 for stream in "$here"/../data/conformance/*.htvm; do
     stored "$stream"
 done
+# Why frames were sent, as htvm info tells it.
+stored "$here/../data/conformance/reasons_4.htvm"
+"$htvm" info "$here/../data/conformance/reasons_4.htvm" --json | python3 -c '
+import json, sys
+for frame in json.load(sys.stdin)["frames"]:
+    if frame["type"] in ("I", "TP"):
+        print("frame %d: %s" % (frame["frame"], frame.get("reason", "none")))' >"$work/reasons"
+sed -n 's/: .*, reason /: /p' "$work/kinds" | cmp - "$work/reasons" || { echo "reasons_4: other reasons"; cat "$work/kinds"; exit 1; }
+[ "$(cat "$work/reasons")" = "$(printf 'frame 0: none\nframe 2: region\nframe 4: due\nframe 8: none')" ] ||
+    { echo "reasons_4: not the reasons that it has"; cat "$work/reasons"; exit 1; }
 # Its pictures, as far as it reads them.
 python3 "$here/picture.py" "$here/../data/conformance/pictures_6.htvm" >"$work/pictures"
 cut -d' ' -f1-10 "$here/../data/conformance/pictures_6.pictures" | cmp - "$work/pictures" ||

@@ -76,7 +76,10 @@ def in_millimetres(mesh, header):
 def how_coded(packet):
     if packet.kind == ENHANCED:
         return "in_part" if CODED_BONES in read_frame_payload(packet.payload).layers else "enhanced"
-    return {INTRA: "intra", PREDICTED: "predicted", TRACKED: "tracked", PATCHED: "patched"}[packet.kind]
+    kind = {INTRA: "intra", PREDICTED: "predicted", TRACKED: "tracked", PATCHED: "patched"}[packet.kind]
+    if packet.kind not in (INTRA, PATCHED):
+        return kind
+    return "%s, reason %s" % (kind, read_frame_payload(packet.payload).reason())
 
 
 def main(stream, folder):

@@ -128,12 +128,19 @@ def read_metadata(read):
 # ---------------------------------------------------------------------------------------------- 4. frame payload
 
 (POSE, TRANSFORMS, GEOMETRY, COLOUR, NORMALS, TEXCOORDS, MAPPING, FANS, DISTANCE_ORDERS, EXTERNAL,
- CODED_BONES, TRACKED_RUN, REMOVED, BORDER, CHARTS, PRESENCE) = range(1, 17)
+ CODED_BONES, TRACKED_RUN, REMOVED, BORDER, CHARTS, PRESENCE, REASON) = range(1, 18)
+
+REASONS = "none", "due", "patches", "surface", "region", "strays", "border", "texture", "rate", "cut"  # 8.20
 
 
 class Frame:
     def layer(self, number):
         return self.layers.get(number, b"")
+
+    def reason(self):
+        """Why an I- or TP-frame was sent (8.20)."""
+        layer = self.layer(REASON)
+        return REASONS[layer[0] if len(layer) == 1 and layer[0] < len(REASONS) else 0]
 
 
 def read_frame_payload(payload):
@@ -151,7 +158,7 @@ def read_frame_payload(payload):
     frame.layers = {}
     for number, size in table:
         layer = read.take(size)
-        if number < 17:
+        if number < 18:
             check(number not in frame.layers, "a layer comes twice")
             frame.layers[number] = layer
     return frame

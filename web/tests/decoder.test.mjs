@@ -30,6 +30,15 @@ test('bytes in pieces of any size give the same frames as packets', async () => 
     decoder.close();
 });
 
+test('a frame says why it was sent', async () => {
+    const decoder = module.createDecoder();
+    decoder.sendBytes(await conformance('reasons_4'));
+    const told = [];
+    for (let frame = decoder.receive(); frame; frame = decoder.receive()) if (frame.letter !== 'T') told.push([frame.frame, frame.reason]);
+    assert.deepEqual(told, [[0, null], [2, 'region'], [4, 'due'], [8, null]]);
+    decoder.close();
+});
+
 test('the header, the layers and the index are told', async () => {
     const packets = packetsOf(await conformance('tracked'));
     const decoder = module.createDecoder();

@@ -82,13 +82,18 @@ OutgoingFrame outgoing(const Configuration& configuration, CodedFrame frame, con
     return out;
 }
 
+FrameReason reason_of_due(const Configuration& configuration, std::uint32_t number) {
+    return number == 0 || configuration.intra_only() ? FrameReason::none : FrameReason::due;
+}
+
 Packet frame_packet(PacketKind kind, std::vector<std::uint8_t> payload) {
     Packet packet;
     packet.kind = kind;
     packet.payload = std::move(payload);
     return packet;
 }
-Packet frame_packet(PacketKind kind, const FramePayload& payload) {
+Packet frame_packet(PacketKind kind, FramePayload payload, FrameReason reason) {
+    if (reason != FrameReason::none) payload.set(Layer::reason, {static_cast<std::uint8_t>(reason)});
     return frame_packet(kind, write_frame_payload(payload));
 }
 

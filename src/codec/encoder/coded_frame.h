@@ -71,8 +71,13 @@ struct OutgoingFrame {
 OutgoingFrame outgoing(const Configuration& configuration, CodedFrame frame, const TexturedSurface* of_reference,
                        std::uint32_t number, std::int64_t timestamp_us, const FrameCost& cost);
 
+// The reason of an I-frame of this number that is due. The first frame of a stream, and a stream of I-frames, need
+// none.
+FrameReason reason_of_due(const Configuration& configuration, std::uint32_t number);
+
 Packet frame_packet(PacketKind kind, std::vector<std::uint8_t> payload);
-Packet frame_packet(PacketKind kind, const FramePayload& payload);
+// reason: of an I- or TP-frame, which says so if there is one.
+Packet frame_packet(PacketKind kind, FramePayload payload, FrameReason reason = FrameReason::none);
 
 CapturedCounts counts_of(const LatticeMesh& captured);
 

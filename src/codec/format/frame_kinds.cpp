@@ -10,7 +10,7 @@ using enum Layer;
 constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
     {.type = FrameType::intra,
      .packet = PacketKind::intra,
-     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra, charts, presence},
+     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra, charts, presence, reason},
      .refers_to = RefersTo::nothing,
      .codebooks = false,
      .referred = true,
@@ -48,7 +48,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .rate = RateClass::between},
     {.type = FrameType::patched,
      .packet = PacketKind::patched,
-     .layers = {pose, tracked, removed, border, fans, geometry, colour, charts},
+     .layers = {pose, tracked, removed, border, fans, geometry, colour, charts, reason},
      .refers_to = RefersTo::reference,
      .codebooks = false,
      .referred = true,
@@ -60,11 +60,13 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
 
 namespace {
 
-// Rows are indexed by FrameType.
+// Rows are indexed by FrameType, and those of frame_reasons by FrameReason.
 constexpr bool in_order() {
     for (std::size_t i = 0; i < frame_type_count; ++i)
         if (frame_kinds[i].type != static_cast<FrameType>(i) || frame_rules[i].type != static_cast<FrameType>(i))
             return false;
+    for (std::size_t i = 0; i < frame_reasons.size(); ++i)
+        if (frame_reasons[i].reason != static_cast<FrameReason>(i)) return false;
     return true;
 }
 static_assert(in_order());

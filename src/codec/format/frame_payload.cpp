@@ -100,8 +100,19 @@ FrameInfo describe(const Packet& packet, FrameType type) {
     return out;
 }
 
+namespace {
+
+// A reason that this version does not know decides nothing, so it is as if none was told.
+FrameReason read_reason(const FramePayloadView& payload) {
+    const auto layer = payload.of(Layer::reason);
+    return layer.size() == 1 && layer[0] < frame_reasons.size() ? FrameReason{layer[0]} : FrameReason::none;
+}
+
+}  // namespace
+
 FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView& payload) {
     auto out = describe(packet, type);
+    if (rules_of(type).layers.has(Layer::reason)) out.reason = read_reason(payload);
     out.source_vertices = payload.header.source_vertices;
     out.source_triangles = payload.header.source_triangles;
     out.vertices = payload.header.vertices;

@@ -24,6 +24,13 @@ bool is_scene_change(const BonesWork& work) {
     return scene_changed(work.mesh().positions, work.motion->predicted, configuration.scale.on_lattice(far));
 }
 
+// Why it must be an I-frame, before anything is coded; nothing if it need not be.
+std::optional<FrameReason> why_intra(const BonesWork& work) {
+    if (intra_is_due(work)) return reason_of_due(work.configuration, work.sequence.next_frame);
+    if (is_scene_change(work)) return FrameReason::cut;
+    return std::nullopt;
+}
+
 // ---- what may be animated -------------------------------------------------------------------------------------------
 
 // The largest error, in lattice units, that a part may have and still be animated; 0: not checked.
@@ -69,7 +76,7 @@ Result<Frame> choose_by_motion(const BonesWork& work, BonesProgress& progress, c
         work.configuration.scale.in_space(LatticeUnits(std::accumulate(shifts.begin(), shifts.end(), 0.0))).value;
     const auto& options = work.configuration.options.topology;
     if (options.intra_above > 0 && motion > options.intra_above && may_be_intra(work))
-        return as_frame(code_intra(work, steps));
+        return as_frame(code_intra(work, steps, FrameReason::surface));
     if (motion < options.predicted_below && animation_fits(work)) return Frame(code_predicted(work));
     return Frame(code_what_moves(work, progress, steps));
 }
@@ -80,7 +87,7 @@ Result<Frame> choose_by_motion(const BonesWork& work, BonesProgress& progress, c
 Result<double> plain_intra_bytes(const BonesWork& work, const FrameSteps& steps) {
     const auto& known = work.sequence.history.plain_intra_bytes;
     if (known > 0 && work.reference().steps == steps) return known;
-    const auto plain = code_unreferred_intra(work, steps);
+    const auto plain = code_unreferred_intra(work, steps, FrameReason::none);
     if (!plain) return tl::unexpected(plain.error());
     return static_cast<double>(plain->frame.bytes()) / static_cast<double>(work.mesh().positions.size());
 }
@@ -120,7 +127,8 @@ Result<Frame> choose_the_cheaper(const BonesWork& work, BonesProgress& progress,
         trial.next = work.sequence.next_frame + (2u << trial.losses);
     }
     const bool referred_to = work.sequence.next_frame + 1 >= trial.next;
-    auto intra = referred_to ? code_intra(work, steps) : code_unreferred_intra(work, steps);
+    auto intra = referred_to ? code_intra(work, steps, FrameReason::rate)
+                             : code_unreferred_intra(work, steps, FrameReason::rate);
     if (intra) intra->trial = trial;
     return as_frame(std::move(intra));
 }
@@ -140,10 +148,10 @@ bool within(const SurfaceErrors& errors, const SurfaceErrors& allowed) {
 }
 
 // Codes an I-frame, and measures the errors of one that nothing refers to.
-Result<BonesIntra> code_measured_intra(const BonesWork& work, const FrameSteps& steps) {
-    auto out = code_intra(work, steps);
+Result<BonesIntra> code_measured_intra(const BonesWork& work, const FrameSteps& steps, FrameReason reason) {
+    auto out = code_intra(work, steps, reason);
     if (!out) return out;
-    const auto plain = code_unreferred_intra(work, steps);
+    const auto plain = code_unreferred_intra(work, steps, FrameReason::none);
     if (!plain) return plain;
     StageClock clock(work.stages);
     out->plain = errors_of(work, plain->frame.decoded);
@@ -193,7 +201,7 @@ Result<Frame> choose_by_cost(const BonesWork& work, BonesProgress& progress, con
     const bool good = within(errors_of(work, enhanced.frame.decoded), allowed);
     const bool due = intra_is_paid_for(work, enhanced.frame);
     if (good && !due && !is_expensive(work, enhanced.frame)) return Frame(std::move(enhanced));
-    auto intra = code_measured_intra(work, steps);
+    auto intra = code_measured_intra(work, steps, good ? FrameReason::rate : FrameReason::surface);
     if (!intra) return as_frame(std::move(intra));
     if (good && !due && enhanced.frame.bytes() <= intra->frame.bytes()) return Frame(std::move(enhanced));
     return as_frame(std::move(intra));
@@ -205,10 +213,13 @@ FrameType expected_type(const BonesWork& work) { return intra_is_due(work) ? Fra
 
 Result<Frame> choose(const BonesWork& work, BonesProgress& progress, const FrameSteps& steps) {
     const auto choice = work.configuration.options.topology.frame_choice;
-    if (!may_be_referred_to(work.mesh())) return as_frame(code_unreferred_intra(work, steps));
-    if (intra_is_due(work) || is_scene_change(work)) {
-        if (choice == FrameChoice::rate_distortion) return as_frame(code_measured_intra(work, steps));
-        return as_frame(work.configuration.intra_only() ? code_unreferred_intra(work, steps) : code_intra(work, steps));
+    if (!may_be_referred_to(work.mesh()))
+        return as_frame(
+            code_unreferred_intra(work, steps, reason_of_due(work.configuration, work.sequence.next_frame)));
+    if (const auto reason = why_intra(work)) {
+        if (choice == FrameChoice::rate_distortion) return as_frame(code_measured_intra(work, steps, *reason));
+        return as_frame(work.configuration.intra_only() ? code_unreferred_intra(work, steps, *reason)
+                                                        : code_intra(work, steps, *reason));
     }
     switch (choice) {
         case FrameChoice::motion:

@@ -8,7 +8,7 @@
 namespace htvm::internal {
 namespace {
 
-Result<BonesIntra> code_intra_for(const BonesWork& work, FrameSteps steps, bool referred_to) {
+Result<BonesIntra> code_intra_for(const BonesWork& work, FrameSteps steps, bool referred_to, FrameReason reason) {
     const auto& configuration = work.configuration;
     const auto& mesh = work.mesh();
     const auto captured = counts_of(mesh);
@@ -32,7 +32,7 @@ Result<BonesIntra> code_intra_for(const BonesWork& work, FrameSteps steps, bool 
     // Under rate control also what stands in for a frame that does not fit may refer to it.
     frame.referred =
         may_be_referred_to(mesh) && (!configuration.intra_only() || configuration.options.rate.bits_per_second > 0);
-    frame.packets.push_back(frame_packet(PacketKind::intra, coded->payload));
+    frame.packets.push_back(frame_packet(PacketKind::intra, std::move(coded->payload), reason));
     clock.done("intra coding");
     return out;
 }
@@ -104,7 +104,7 @@ BonesMoved code_residuals(const BonesWork& work, const EnhancedFrameSource& sour
     history.motion = work.motion->motion;
     send_codebook(work.sequence.next_frame, codebook_for_geometry, history.codebooks.geometry, frame.packets);
     send_codebook(work.sequence.next_frame, codebook_for_colour, history.codebooks.colour, frame.packets);
-    frame.packets.push_back(frame_packet(PacketKind::enhanced, encoded.payload));
+    frame.packets.push_back(frame_packet(PacketKind::enhanced, std::move(encoded.payload)));
     frame.decoded = std::move(encoded.mesh);
     out.distance_order_counts = std::move(encoded.distance_order_counts);
     return out;
@@ -130,12 +130,12 @@ BonesMoved code_moving_part(const BonesWork& work, const FrameSteps& steps, cons
 
 }  // namespace
 
-Result<BonesIntra> code_intra(const BonesWork& work, const FrameSteps& steps) {
-    return code_intra_for(work, steps, true);
+Result<BonesIntra> code_intra(const BonesWork& work, const FrameSteps& steps, FrameReason reason) {
+    return code_intra_for(work, steps, true, reason);
 }
 
-Result<BonesIntra> code_unreferred_intra(const BonesWork& work, const FrameSteps& steps) {
-    return code_intra_for(work, steps, false);
+Result<BonesIntra> code_unreferred_intra(const BonesWork& work, const FrameSteps& steps, FrameReason reason) {
+    return code_intra_for(work, steps, false, reason);
 }
 
 BonesMoved code_predicted(const BonesWork& work) {

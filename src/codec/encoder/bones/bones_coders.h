@@ -9,9 +9,9 @@
 
 namespace htvm::internal {
 
-Result<BonesIntra> code_intra(const BonesWork& work, const FrameSteps& steps);
+Result<BonesIntra> code_intra(const BonesWork& work, const FrameSteps& steps, FrameReason reason);
 // An I-frame that nothing refers to: it is quantised exactly with the steps asked for.
-Result<BonesIntra> code_unreferred_intra(const BonesWork& work, const FrameSteps& steps);
+Result<BonesIntra> code_unreferred_intra(const BonesWork& work, const FrameSteps& steps, FrameReason reason);
 
 BonesMoved code_predicted(const BonesWork& work);
 

@@ -30,24 +30,31 @@ LatticeUnits allowed_over_all(const TrackedWork& work, LatticeUnits best) {
     return std::max(numbers.worst_to_best * best, numbers.quantised * step);
 }
 
-// Whether so much is lost that the picture falls apart: most of the person, as where a capture is cut, or all of a
-// limb.
-bool falls_apart(const TrackedWork& work, const TrackedFit& fit) {
+// Why the picture falls apart: most of the person is lost, as where a capture is cut, or all of a limb. Nothing if it
+// does not.
+std::optional<FrameReason> why_apart(const TrackedWork& work, const TrackedFit& fit) {
     const auto& scale = work.configuration.scale;
     const auto best = work.sequence.history.best_fit;
     const auto allowed = std::max(allowed_over_all(work, best), work.reference->origin.fit.rms);
-    return fit.rms > std::max(scale.on_lattice(numbers.most_of_all), numbers.apart_to_lost * allowed) ||
-           fit.worst_region > std::max(scale.on_lattice(numbers.most_in_region),
-                                       numbers.apart_to_lost * allowed_in_region(work, best));
+    if (fit.rms > std::max(scale.on_lattice(numbers.most_of_all), numbers.apart_to_lost * allowed))
+        return FrameReason::cut;
+    if (fit.worst_region >
+        std::max(scale.on_lattice(numbers.most_in_region), numbers.apart_to_lost * allowed_in_region(work, best)))
+        return FrameReason::region;
+    return std::nullopt;
 }
 
-// Whether a T-frame fits visibly worse than the T-frames of its I-frame can: over the whole surface, or in one region,
-// such as a hand.
-bool is_lost(const TrackedWork& work, const TrackedFit& fit) {
+// Why a T-frame counts as lost: it fits visibly worse than the T-frames of its I-frame can, over the whole surface, or
+// in one region, such as a hand. Of several reasons the one of most surface. Nothing if it fits.
+std::optional<FrameReason> why_lost(const TrackedWork& work, const TrackedFit& fit) {
     const auto best_fit = work.sequence.history.best_fit;
     const auto best = best_fit.value > 0 ? best_fit : fit.rms;
-    return fit.stray_share > work.reference->origin.fit.stray_share + numbers.more_strays ||
-           fit.rms > allowed_over_all(work, best) || fit.worst_region > allowed_in_region(work, best);
+    const bool surface = fit.rms > allowed_over_all(work, best);
+    const bool region = fit.worst_region > allowed_in_region(work, best);
+    const bool strays = fit.stray_share > work.reference->origin.fit.stray_share + numbers.more_strays;
+    if (!surface && !region && !strays) return std::nullopt;
+    if (const auto apart = why_apart(work, fit)) return apart;
+    return surface ? FrameReason::surface : region ? FrameReason::region : FrameReason::strays;
 }
 
 TrackedFit fit_of(const TrackedWork& work, const EncodedTrackedFrame& encoded) {
@@ -106,7 +113,8 @@ SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& ste
 // The T-frame with the lost regions replaced; nothing if that is not possible, does not help, or costs about as much as
 // an I-frame. Where regions alone do not help, as where much is a little off, all that is lost is replaced.
 Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeRegistration& registered,
-                                          const FrameSteps& steps, const EncodedTrackedFrame& tracked) {
+                                          const FrameSteps& steps, const EncodedTrackedFrame& tracked,
+                                          FrameReason reason) {
     using Patched = std::optional<TrackedPatch>;
     const auto& reference = *work.reference;
     const auto lost = std::min(allowed_in_region(work, work.sequence.history.best_fit),
@@ -121,13 +129,13 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
         const auto found = search.find(region_lost);
         clock.done("patch");
         if (!found) continue;
-        auto coded = code_patch(work, registered, steps, tracked, *found);
+        auto coded = code_patch(work, registered, steps, tracked, *found, reason);
         if (!coded) return tl::unexpected(coded.error());
         auto& out = *coded;
         if (!out) continue;
         auto& fit = out->origin.fit;
         if (static_cast<double>(out->frame.bytes()) > numbers.most_patch_bytes * reference.intra_bytes ||
-            is_lost(work, fit))
+            why_lost(work, fit))
             continue;
         fit = least_of(std::move(fit), reference.origin.fit);
         out->best_fit = work.sequence.history.best_fit;
@@ -152,7 +160,7 @@ bool should_grow(const TrackedWork& work, const TrackedFit& fit) {
 struct JudgedMotion {
     CodedMotion coded;
     TrackedFit fit;
-    bool lost = false;
+    std::optional<FrameReason> lost = {};  // why, if it is
     // What patches are planned on, if the frame is lost and may be patched, and that is not what was coded.
     std::optional<EncodedTrackedFrame> for_patches = {};
     const EncodedTrackedFrame& to_patch() const { return for_patches ? *for_patches : coded.encoded; }
@@ -163,7 +171,7 @@ Result<JudgedMotion> code_and_judge(const TrackedWork& work, const NodeRegistrat
     auto coded = code_motion(work, registered, steps, MotionParts::all);
     if (!coded) return tl::unexpected(coded.error());
     auto fit = fit_of(work, coded->encoded);
-    const bool lost = is_lost(work, fit);
+    const auto lost = why_lost(work, fit);
     return JudgedMotion{std::move(*coded), std::move(fit), lost};
 }
 
@@ -201,7 +209,7 @@ Result<void> look_for_limbs(const TrackedWork& work, Tracking& tracking, const F
         if (!*of_reference) return tl::unexpected(of_reference->error());
         motion.for_patches = std::move(**of_reference);
     }
-    if (!limbs.any || (patches && is_lost(work, fit_of(work, motion.to_patch())))) return {};
+    if (!limbs.any || (patches && why_lost(work, fit_of(work, motion.to_patch())))) return {};
     auto again = code_and_judge(work, *tracking.registered, steps);
     if (!again) return tl::unexpected(again.error());
     again->for_patches = std::move(motion.for_patches);
@@ -222,6 +230,31 @@ Result<Frame> as_frame(Result<TrackedIntra> intra) {
     return Frame(std::move(*intra));
 }
 
+// Why a T-frame that can be patched is: what a patch repairs is a part, however far off it was.
+FrameReason why_patched(std::optional<FrameReason> lost) {
+    if (!lost) return FrameReason::border;
+    return *lost == FrameReason::cut ? FrameReason::region : *lost;
+}
+
+// Why an I-frame of the capture is sent though the T-frame may fit; nothing if none is.
+std::optional<FrameReason> why_anew(const TrackedWork& work, const CodedMotion& coded) {
+    if (may_be_intra(work) && static_cast<double>(coded.bytes()) > work.reference->intra_bytes)
+        return FrameReason::rate;
+    if (texture_is_laid_out_anew(work, coded.encoded.mesh)) return FrameReason::texture;
+    return std::nullopt;
+}
+
+// Why an I-frame is sent instead of the T-frame; nothing if none is. Where the T-frame is lost, it may take many bits
+// for that.
+std::optional<FrameReason> why_intra(const TrackedWork& work, bool due, std::optional<FrameReason> lost,
+                                     std::optional<FrameReason> anew) {
+    if (due) return FrameReason::due;
+    if (lost) return lost;
+    if (anew) return anew;
+    if (patches_have_grown(work)) return FrameReason::patches;
+    return std::nullopt;
+}
+
 // A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the reference's mesh can
 // no longer follow, so that part of it is replaced, or an I-frame is sent. An I-frame is also sent once a T-frame takes
 // more bits than the last I-frame did, if the shortest key interval has passed. Where one is due for those who join
@@ -237,7 +270,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     if (work.effort.motion_alone && !due) {
         auto bare = code_motion(work, *tracking.registered, steps, MotionParts::motion_alone);
         if (!bare) return tl::unexpected(bare.error());
-        if (!falls_apart(work, fit_of(work, bare->encoded))) return send(std::move(*bare), best_before);
+        if (!why_apart(work, fit_of(work, bare->encoded))) return send(std::move(*bare), best_before);
     }
 
     // 2. A T-frame, and how well it fits. Behind an I-frame it is not known yet how well its T-frames can fit; where
@@ -245,15 +278,15 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     if (work.effort.always_other_starts) follow_limbs_anyway(work, tracking);
     auto motion = code_and_judge(work, *tracking.registered, steps);
     if (!motion) return tl::unexpected(motion.error());
-    const bool must_be_repaired = (motion->lost || work.effort.motion_alone) && falls_apart(work, motion->fit);
-    motion->lost = motion->lost || must_be_repaired;
+    const auto apart = motion->lost || work.effort.motion_alone ? why_apart(work, motion->fit) : std::nullopt;
+    if (apart) motion->lost = apart;
     const auto& may_repair = work.captured.may_repair;
-    if (motion->lost && !due && !must_be_repaired && may_repair && !may_repair())
+    if (motion->lost && !due && !apart && may_repair && !may_repair())
         return send(std::move(motion->coded), best_before);
 
     // 3. Where tracking is lost: limbs from another start.
     const bool patches = may_be_patched(work, due);
-    const bool was_lost = motion->lost;
+    const bool was_lost = motion->lost.has_value();
     if (was_lost) {
         tracking.lost = true;
         if (auto ok = look_for_limbs(work, tracking, steps, patches, *motion); !ok) return tl::unexpected(ok.error());
@@ -261,9 +294,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
 
     // 4. Where it still is, or where surface was captured that is not tracked: a patch.
     const auto& tracked = motion->coded.encoded;
-    const bool expensive =
-        may_be_intra(work) && static_cast<double>(motion->coded.bytes()) > work.reference->intra_bytes;
-    const bool anew = expensive || texture_is_laid_out_anew(work, tracked.mesh);
+    const auto anew = why_anew(work, motion->coded);
     const bool grows = !motion->lost && work.configuration.tells_presence() && should_grow(work, motion->fit);
     if (!anew && patches && ((motion->lost && was_lost) || grows)) {
         if (grows && !motion->coded.of_reference) {
@@ -271,7 +302,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
             if (!of_reference) return tl::unexpected(of_reference.error());
             motion->for_patches = std::move(*of_reference);
         }
-        auto patched = patch(work, *tracking.registered, steps, motion->to_patch());
+        auto patched = patch(work, *tracking.registered, steps, motion->to_patch(), why_patched(motion->lost));
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) return Frame(std::move(**patched));
     }
@@ -279,9 +310,10 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     // 5. The T-frame, or an I-frame: of the tracked mesh, where that is as good.
     const bool best = !motion->lost && (best_before.value == 0 || motion->fit.rms < best_before);
     const auto best_fit = best ? motion->fit.rms : best_before;
-    if (!anew && !motion->lost && !due && !patches_have_grown(work)) return send(std::move(motion->coded), best_fit);
+    const auto reason = why_intra(work, due, motion->lost, anew);
+    if (!reason) return send(std::move(motion->coded), best_fit);
     const bool renewed = !anew && !motion->lost && may_be_renewed(work, steps, tracked.mesh);
-    auto intra = renewed ? code_renewal(work, steps, tracked) : code_intra(work, steps);
+    auto intra = renewed ? code_renewal(work, steps, tracked, *reason) : code_intra(work, steps, *reason);
     if (intra && !motion->lost) intra->best_fit = best_fit;
     return as_frame(std::move(intra));
 }
@@ -291,9 +323,11 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
 FrameType expected_type(const TrackedWork& work) { return intra_is_due(work) ? FrameType::intra : FrameType::tracked; }
 
 Result<Frame> choose(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {
-    if (!carries_surface(work.captured.mesh)) return as_frame(code_unreferred_intra(work, steps));
-    if (can_refer(work)) return choose_by_fit(work, tracking, steps);
-    return as_frame(work.configuration.intra_only() ? code_unreferred_intra(work, steps) : code_intra(work, steps));
+    const bool surface = carries_surface(work.captured.mesh);
+    if (surface && can_refer(work)) return choose_by_fit(work, tracking, steps);
+    const auto reason = reason_of_due(work.configuration, work.sequence.next_frame);
+    const bool referred_to = surface && !work.configuration.intra_only();
+    return as_frame(referred_to ? code_intra(work, steps, reason) : code_unreferred_intra(work, steps, reason));
 }
 
 Result<Frame> code_stand_in(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {

@@ -87,7 +87,7 @@ Presence presence_by_place(const IntraSource& source, const LatticeMesh& coded, 
 
 // steps: asked for.
 Result<TrackedIntra> code_intra_of(const TrackedWork& work, const IntraSource& source, const FrameSteps& steps,
-                                   FrameSteps quantised, IntraUse use) {
+                                   FrameSteps quantised, IntraUse use, FrameReason reason) {
     const auto& configuration = work.configuration;
     const auto captured = counts_of(work.captured.mesh);
     const bool referred_to = use == IntraUse::reference;
@@ -118,7 +118,7 @@ Result<TrackedIntra> code_intra_of(const TrackedWork& work, const IntraSource& s
     // Under rate control also what stands in for a frame that does not fit may refer to it.
     frame.referred = carries_surface(work.captured.mesh) && !frame.decoded.triangles.empty() &&
                      (!configuration.intra_only() || configuration.options.rate.bits_per_second > 0);
-    frame.packets.push_back(frame_packet(PacketKind::intra, coded->payload));
+    frame.packets.push_back(frame_packet(PacketKind::intra, std::move(coded->payload), reason));
     auto& origin = out.origin;
     origin.edge = mean_edge(work.captured.mesh.positions, work.captured.mesh.triangles);
     origin.steps = steps;
@@ -130,10 +130,11 @@ Result<TrackedIntra> code_intra_of(const TrackedWork& work, const IntraSource& s
     return out;
 }
 
-Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameSteps& steps, IntraUse use) {
+Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameSteps& steps, IntraUse use,
+                                           FrameReason reason) {
     const bool simplify = work.configuration.options.tracked.simplify > 0 && carries_surface(work.captured.mesh);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
-    return code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use);
+    return code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use, reason);
 }
 
 // Not where frames are to have an error that is measured against the capture, noise and all.
@@ -203,12 +204,12 @@ SimplifiedReferenceOptions simplification_options(const Configuration& configura
     return out;
 }
 
-Result<TrackedIntra> code_intra(const TrackedWork& work, const FrameSteps& steps) {
-    return code_intra_of_capture(work, steps, IntraUse::reference);
+Result<TrackedIntra> code_intra(const TrackedWork& work, const FrameSteps& steps, FrameReason reason) {
+    return code_intra_of_capture(work, steps, IntraUse::reference, reason);
 }
 
-Result<TrackedIntra> code_unreferred_intra(const TrackedWork& work, const FrameSteps& steps) {
-    return code_intra_of_capture(work, steps, IntraUse::none);
+Result<TrackedIntra> code_unreferred_intra(const TrackedWork& work, const FrameSteps& steps, FrameReason reason) {
+    return code_intra_of_capture(work, steps, IntraUse::none, reason);
 }
 
 namespace {
@@ -235,8 +236,8 @@ LatticeMesh seen_lately(const EncodedTrackedFrame& tracked, Presence& presence) 
 
 }  // namespace
 
-Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps,
-                                  const EncodedTrackedFrame& tracked) {
+Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps, const EncodedTrackedFrame& tracked,
+                                  FrameReason reason) {
     auto quantised = tracked_steps(steps);
     quantised.geometry =
         std::max(1, static_cast<std::int32_t>(std::lround(tracking_numbers.finer_renewed * quantised.geometry)));
@@ -244,7 +245,7 @@ Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& ste
     const bool tells_presence = !tracked.presence.unseen.empty();
     const auto lately = tells_presence ? seen_lately(tracked, presence) : LatticeMesh{};
     auto out = code_intra_of(work, {tells_presence ? lately : tracked.mesh, std::move(presence), true}, steps,
-                             quantised, IntraUse::reference);
+                             quantised, IntraUse::reference, reason);
     if (!out) return out;
     const auto& before = work.reference->origin;
     out->origin.fit = least_of(std::move(out->origin.fit), before.fit);
@@ -305,7 +306,7 @@ Result<EncodedTrackedFrame> code_for_patches(const TrackedWork& work, const Node
 
 Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const NodeRegistration& registered,
                                                const FrameSteps& steps, const EncodedTrackedFrame& tracked,
-                                               const SurfacePatch& patch) {
+                                               const SurfacePatch& patch, FrameReason reason) {
     const auto& reference = *work.reference;
     const auto& by_nodes = *reference.decoded.by_nodes;
     StageClock clock(work.stages);
@@ -339,7 +340,7 @@ Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const No
         out.presence = on_new_reference(tracked.presence, patched->stays, vertices);
     }
     frame.captured = captured;
-    frame.packets.push_back(frame_packet(PacketKind::patched, payload));
+    frame.packets.push_back(frame_packet(PacketKind::patched, std::move(payload), reason));
     if (denoises(work.configuration))
         out.targets = on_new_reference(tracked.targets, patched->stays, vertices, filter_options(work));
     out.kept = keep_nodes(by_nodes.nodes, patched->stays);

@@ -17,11 +17,12 @@ SimplifiedReferenceOptions simplification_options(const Configuration& configura
 
 // An I-frame of the capture, simplified, for T-frames to refer to; or one that nothing refers to, which is quantised
 // with exactly the steps asked for.
-Result<TrackedIntra> code_intra(const TrackedWork& work, const FrameSteps& steps);
-Result<TrackedIntra> code_unreferred_intra(const TrackedWork& work, const FrameSteps& steps);
+Result<TrackedIntra> code_intra(const TrackedWork& work, const FrameSteps& steps, FrameReason reason);
+Result<TrackedIntra> code_unreferred_intra(const TrackedWork& work, const FrameSteps& steps, FrameReason reason);
 // An I-frame of the tracked mesh instead of the capture: who starts here, or has lost something, gets what the others
 // see, and these see no change. What was not seen for long is left out. tracked: the T-frame.
-Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps, const EncodedTrackedFrame& tracked);
+Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps, const EncodedTrackedFrame& tracked,
+                                  FrameReason reason);
 
 // A T-frame before it is chosen.
 struct CodedMotion {
@@ -47,6 +48,6 @@ Result<EncodedTrackedFrame> code_for_patches(const TrackedWork& work, const Node
 // charts.
 Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const NodeRegistration& registered,
                                                const FrameSteps& steps, const EncodedTrackedFrame& tracked,
-                                               const SurfacePatch& patch);
+                                               const SurfacePatch& patch, FrameReason reason);
 
 }  // namespace htvm::internal

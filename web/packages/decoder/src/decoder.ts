@@ -56,6 +56,8 @@ export interface Frame {
     kind: FrameKind;
     /** As people write it: I, EP, P, T. */
     letter: string;
+    /** Why an I- or TP-frame was sent, such as `due` or `region`; null where none is told. */
+    reason: string | null;
     frame: number;
     reference: number;
     timestampUs: number;
@@ -376,6 +378,8 @@ export class Decoder {
         const info = module.read(this.#scratch, layouts.htvm_frame_info);
         const kind = module.text(module.call('htvm_frame_kind_name', info.type)) as FrameKind;
         const letter = module.text(module.call('htvm_frame_kind_letter', info.type));
+        const reason =
+            info.reason === constants.HTVM_REASON_NONE ? null : module.text(module.call('htvm_frame_reason_name', info.reason));
         this.#check(module.call('htvm_decoder_view', this.#handle, this.#scratch, layouts.htvm_mesh_view.size));
         const view = module.read(this.#scratch, layouts.htvm_mesh_view);
         const floats = (address: number, each: number): Float32Array =>
@@ -383,6 +387,7 @@ export class Decoder {
         return {
             kind,
             letter,
+            reason,
             frame: info.frame,
             reference: info.reference,
             timestampUs: info.timestamp_us,
