@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -23,12 +24,14 @@ struct Options {
     std::vector<std::string> inputs;
     unsigned threads = 1;
     int repeat = 5;
+    bool prepare = false;
     bool json = false;
 };
 
 struct TimedFrame {
     FrameInfo info;
     double milliseconds = 0;  // the least of all rounds: what else the machine does only adds
+    double prepared = 0;      // likewise, of Decoder::prepare() behind it
 };
 
 Result<std::vector<TimedFrame>> timed_frames(const std::string& file, const Options& options) {
@@ -54,9 +57,14 @@ Result<std::vector<TimedFrame>> timed_frames(const std::string& file, const Opti
             progress.step();
             if (!frame) return fail(frame.error().kind, file + ": " + frame.error().message);
             if (!*frame) continue;
-            if (round == 0) out.push_back({(*frame)->info, milliseconds});
-            auto& least = out[at++].milliseconds;
-            least = std::min(least, milliseconds);
+            if (round == 0) out.push_back({(*frame)->info, milliseconds, std::numeric_limits<double>::max()});
+            auto& own = out[at++];
+            own.milliseconds = std::min(own.milliseconds, milliseconds);
+            if (!options.prepare) continue;
+            const auto between = Clock::now();
+            decoder.prepare();
+            own.prepared =
+                std::min(own.prepared, std::chrono::duration<double, std::milli>(Clock::now() - between).count());
         }
     }
     if (out.empty()) return fail(ErrorKind::bad_input, file + ": there is no frame");
@@ -85,12 +93,15 @@ Result<void> run_decoding(const Options& options) {
         std::map<std::string, std::vector<double>> by_kind;
         std::vector<std::uint32_t> vertices;
         auto listed = nlohmann::json::array();
+        double longest = 0;
         for (const auto& frame : *frames) {
             const std::string kind = kind_of(frame.info.type).letter;
             times.push_back(frame.milliseconds);
             by_kind[kind].push_back(frame.milliseconds);
             vertices.push_back(frame.info.vertices);
             listed.push_back({{"frame", frame.info.frame}, {"type", kind}, {"ms", frame.milliseconds}});
+            if (options.prepare) listed.back()["prepare_ms"] = frame.prepared;
+            longest = std::max(longest, frame.prepared);
         }
         std::sort(vertices.begin(), vertices.end());
         auto of_file = summary(times);
@@ -103,6 +114,10 @@ Result<void> run_decoding(const Options& options) {
                        "", "frames", "p50 ms", "p99 ms", "max ms");
             for (const auto& [kind, of] : of_file["by_type"].items()) fmt::print("{}", row(kind + "-frames", of));
             fmt::print("{}p99 is {:.1f} times p50\n", row("all", of_file), of_file["p99_over_p50"].get<double>());
+        }
+        if (options.prepare) {
+            of_file["longest_prepare_ms"] = longest;
+            if (!options.json) fmt::print("between frames, {:.2f} ms at most\n", longest);
         }
         of_file["list"] = std::move(listed);
         all.push_back(std::move(of_file));
@@ -120,10 +135,12 @@ void add_decoding(CLI::App& app, app::Run& run) {
     command->add_option("--threads", options->threads, "Threads of the decoder (default 1)")->check(CLI::Range(1, 256));
     command->add_option("--repeat", options->repeat, "Rounds; of each frame the shortest time counts (default 5)")
         ->check(CLI::Range(1, 1000));
+    command->add_flag("--prepare", options->prepare,
+                      "Derive between two frames what the next one needs, as the web player does; told apart");
     command->add_flag("--json", options->json, "Print the result, with each frame's time, as JSON on standard output");
     command->footer(
         "Times are of the decoder alone, from packets in memory to meshes in memory. What a kind of frame leaves for\n"
-        "the next one to derive counts there.\n\n"
+        "the next one to derive counts there, or with --prepare between the two.\n\n"
         "Example:\n"
         "  htvm-lab decoding stream.htvm");
     command->callback([options, &run] { run = [options] { return run_decoding(*options); }; });

@@ -121,6 +121,10 @@ public:
     // The same as copies that the caller owns.
     Result<std::optional<DecodedFrame>> decode_copy(const Packet& packet);
     std::optional<DecodedFrame> conceal_copy(std::uint32_t frame, std::int64_t timestamp_us);
+    // Derives now what the next frame will need of the last one, where that takes long, as behind an I- or TP-frame:
+    // for callers with time to spare between two frames. It changes no frame, and a frame on loan stays. It may be left
+    // out; the next frame then takes longer.
+    void prepare();
     // Known once a sequence header has been decoded.
     const std::optional<SequenceInfo>& sequence() const;
 

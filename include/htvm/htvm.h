@@ -219,6 +219,11 @@ htvm_status htvm_decoder_receive_frame(htvm_decoder* decoder, htvm_frame_info* i
 htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t timestamp_us, htvm_frame_info* info,
                                  size_t info_size);
 
+/* Derives now what the next frame will need of the last one, where that takes long, as behind an I- or TP-frame: for
+ * callers with time to spare between two frames. It changes no frame, and the current one stays. It may be left out;
+ * the next frame then takes longer. */
+htvm_status htvm_decoder_prepare(htvm_decoder* decoder);
+
 /* Discards what was sent and not received, e.g. for a seek. The sequence header and the last I-frame are kept. */
 htvm_status htvm_decoder_discard(htvm_decoder* decoder);
 

@@ -250,6 +250,12 @@ htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t 
     });
 }
 
+htvm_status htvm_decoder_prepare(htvm_decoder* decoder) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    decoder->decoder.prepare();
+    return HTVM_OK;
+}
+
 htvm_status htvm_decoder_discard(htvm_decoder* decoder) {
     if (!decoder) return HTVM_BAD_INPUT;
     return guarded(decoder->error, [&] {

@@ -177,6 +177,25 @@ TEST(CDecoder, ConcealsAsTheCppDecoder) {
     expect_same_frame(decoder.get(), info, *cpp.conceal_copy(9, 300000));
 }
 
+TEST(CDecoder, PreparingLeavesTheCurrentFrameAndChangesNone) {
+    Decoder cpp;
+    const auto decoder = make_decoder();
+    EXPECT_EQ(htvm_decoder_prepare(nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_prepare(decoder.get()), HTVM_OK);  // before anything has come
+    for (const auto& packet : coded_person().packets) {
+        const auto expected = cpp.decode_copy(packet);
+        ASSERT_TRUE(expected.has_value());
+        const auto bytes = write_packet(packet);
+        ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), bytes.size()), HTVM_OK);
+        htvm_frame_info info;
+        const auto status = htvm_decoder_receive_frame(decoder.get(), &info, sizeof info);
+        EXPECT_EQ(htvm_decoder_prepare(decoder.get()), HTVM_OK);
+        if (!*expected) continue;
+        ASSERT_EQ(status, HTVM_OK);
+        expect_same_frame(decoder.get(), info, **expected);
+    }
+}
+
 TEST(CDecoder, DamagedPacketsAreErrorsWithASentenceAndCostThemselvesOnly) {
     const auto decoder = make_decoder();
     auto bytes = write_packet(coded_grid().packets[0]);

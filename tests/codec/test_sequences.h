@@ -206,7 +206,9 @@ struct DecodedSequence {
     std::vector<Error> errors;
 };
 
-inline DecodedSequence decode_packets(const std::vector<Packet>& packets, const DecoderOptions& options = {}) {
+// prepares: whether Decoder::prepare() is called behind each packet.
+inline DecodedSequence decode_packets(const std::vector<Packet>& packets, const DecoderOptions& options = {},
+                                      bool prepares = false) {
     DecodedSequence out;
     Decoder decoder(options);
     for (const auto& packet : packets) {
@@ -215,6 +217,7 @@ inline DecodedSequence decode_packets(const std::vector<Packet>& packets, const 
             out.errors.push_back(frame.error());
         else if (*frame)
             out.frames.push_back(std::move(**frame));
+        if (prepares) decoder.prepare();
     }
     return out;
 }

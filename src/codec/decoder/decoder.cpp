@@ -382,6 +382,18 @@ std::optional<DecodedFrame> Decoder::conceal_copy(std::uint32_t frame, std::int6
     return within_memory(copied, [] { return std::nullopt; });
 }
 
+void Decoder::prepare() {
+    const auto derived = [&] {
+        auto& state = *state_;
+        state.prepares = true;
+        // What stands in the way is said by the frame that needs it.
+        if (state.reference && state.header->node_spacing > 0)
+            (void)derive_nodes(*state.reference, *state.header, state.threads);
+        return true;
+    };
+    (void)within_memory(derived, [] { return false; });
+}
+
 const std::optional<SequenceInfo>& Decoder::sequence() const { return state_->info; }
 
 }  // namespace htvm

@@ -111,6 +111,7 @@ struct DecoderState {
     std::uint32_t reference_topology = 0;
     std::uint32_t topologies = 0;  // how many numbers were given out
     ShownPresence shown_presence;
+    bool prepares = false;  // whether the caller calls Decoder::prepare()
     DecodedBones bones;
     DecodedNodes nodes;
     std::optional<UnreferredIntra> unreferred;  // where that is the newest frame

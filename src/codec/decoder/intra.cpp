@@ -38,7 +38,8 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
         return {};
     }
     // What depends on bones or nodes is built when a frame asks for it, so that no frame has to do the work of two. Of
-    // the nodes, a third of the work is done at once, which makes this frame and the next take about the same time.
+    // the nodes, a third of the work is done at once, which makes this frame and the next take about the same time,
+    // unless the caller has time between them.
     ReferenceFacts facts{.number = packet.frame,
                          .step = step,
                          .captured = {payload.header.source_vertices, payload.header.source_triangles},
@@ -47,7 +48,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     auto reference = make_reference(header, std::move(facts), std::move(*mesh), std::move(*pose),
                                     {.bones = false, .nodes = false}, state.threads);
     if (!reference) return tl::unexpected(reference.error());
-    derive_hierarchy(*reference, header);
+    if (!state.prepares) derive_hierarchy(*reference, header);
     show(state, view_of(*reference), topology, std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*reference);

@@ -50,12 +50,12 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
                          .presence = std::move(presence)};
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
-    // Its nodes are for the next frame to derive, so that no frame has to do the work of two. A part is done here by a
-    // frame that found its own reference's nodes derived.
+    // Its nodes are for the next frame to derive, or for the time between, so that no frame has to do the work of two.
+    // A part is done here by a frame that found its own reference's nodes derived.
     auto renewed = make_reference(header, std::move(facts), std::move(mesh), std::move(*pose),
                                   {.bones = false, .nodes = false}, state.threads);
     if (!renewed) return tl::unexpected(renewed.error());
-    if (!derives_for_itself) derive_hierarchy(*renewed, header);
+    if (!derives_for_itself && !state.prepares) derive_hierarchy(*renewed, header);
     show(state, view_of(*renewed), topology, std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*renewed);

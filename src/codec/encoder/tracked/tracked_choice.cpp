@@ -125,6 +125,7 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
         work.surface, patch_options(work, steps));
     measuring.done("patch");
     for (const auto region_lost : {lost, LatticeUnits(0)}) {
+        if (region_lost.value == 0 && reason == FrameReason::border) break;  // nothing is lost
         StageClock clock(work.stages);
         const auto found = search.find(region_lost);
         clock.done("patch");
@@ -144,9 +145,16 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
     return Patched();
 }
 
+// Whether something was tried in vain so lately that it is not tried again.
+bool just_in_vain(const TrackedWork& work, const std::optional<std::uint32_t>& last) {
+    return last && std::int64_t{work.sequence.next_frame} - *last < numbers.again_after;
+}
+
 // Whether so much was captured beside what is tracked that the reference should grow: at once where it is much, else
-// now and then, since a patch takes the time of three frames.
-bool should_grow(const TrackedWork& work, const TrackedFit& fit) {
+// now and then, since a patch takes the time of two frames. That is said one frame ahead: the T-frame that shows it is
+// coded by then.
+bool should_grow(const TrackedWork& work, const TrackedFit& fit, const VainAttempts& in_vain) {
+    if (!work.configuration.tells_presence() || just_in_vain(work, in_vain.growth)) return false;
     const auto since = std::int64_t{work.sequence.next_frame} - work.reference->decoded.number;
     const auto& scale = work.configuration.scale;
     const auto wide = fit.widest_uncovered;
@@ -230,11 +238,8 @@ Result<Frame> as_frame(Result<TrackedIntra> intra) {
     return Frame(std::move(*intra));
 }
 
-// Why a T-frame that can be patched is: what a patch repairs is a part, however far off it was.
-FrameReason why_patched(std::optional<FrameReason> lost) {
-    if (!lost) return FrameReason::border;
-    return *lost == FrameReason::cut ? FrameReason::region : *lost;
-}
+// Why a T-frame that is lost is patched: what a patch repairs is a part, however far off it was.
+FrameReason why_patched(FrameReason lost) { return lost == FrameReason::cut ? FrameReason::region : lost; }
 
 // Why an I-frame of the capture is sent though the T-frame may fit; nothing if none is.
 std::optional<FrameReason> why_anew(const TrackedWork& work, const CodedMotion& coded) {
@@ -255,6 +260,18 @@ std::optional<FrameReason> why_intra(const TrackedWork& work, bool due, std::opt
     return std::nullopt;
 }
 
+// A TP-frame that adds what was captured beside what is tracked; nothing if there is none to add.
+Result<std::optional<Frame>> grow(const TrackedWork& work, const NodeRegistration& registered, const FrameSteps& steps,
+                                  const VainAttempts& in_vain) {
+    auto tracked = code_for_patches(work, registered, steps, {});
+    if (!tracked) return tl::unexpected(tracked.error());
+    auto patched = patch(work, registered, steps, *tracked, FrameReason::border);
+    if (!patched) return tl::unexpected(patched.error());
+    if (!*patched) return std::optional<Frame>();
+    (*patched)->in_vain = in_vain;
+    return std::optional(Frame(std::move(**patched)));
+}
+
 // A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the reference's mesh can
 // no longer follow, so that part of it is replaced, or an I-frame is sent. An I-frame is also sent once a T-frame takes
 // more bits than the last I-frame did, if the shortest key interval has passed. Where one is due for those who join
@@ -262,18 +279,31 @@ std::optional<FrameReason> why_intra(const TrackedWork& work, bool due, std::opt
 // so is one whose motion alone is wanted, unless it falls apart.
 Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {
     const bool due = intra_is_due(work);
-    const auto best_before = work.sequence.history.best_fit;
-    const auto send = [&](CodedMotion coded, LatticeUnits best) {
-        return Frame(chosen_motion(work, *tracking.registered, std::move(coded), best));
+    const auto& history = work.sequence.history;
+    auto in_vain = history.in_vain;
+    const auto send = [&](CodedMotion coded, LatticeUnits best, bool to_grow = false) {
+        auto out = chosen_motion(work, *tracking.registered, std::move(coded), best);
+        out.history.to_grow = to_grow;
+        out.history.in_vain = in_vain;
+        return Frame(std::move(out));
     };
     // 1. Its motion alone, where no more is wanted.
     if (work.effort.motion_alone && !due) {
         auto bare = code_motion(work, *tracking.registered, steps, MotionParts::motion_alone);
         if (!bare) return tl::unexpected(bare.error());
-        if (!why_apart(work, fit_of(work, bare->encoded))) return send(std::move(*bare), best_before);
+        if (!why_apart(work, fit_of(work, bare->encoded))) return send(std::move(*bare), history.best_fit);
     }
 
-    // 2. A T-frame, and how well it fits. Behind an I-frame it is not known yet how well its T-frames can fit; where
+    // 2. Where the frame before showed surface that is not tracked: a patch that adds it.
+    const bool patches = may_be_patched(work, due);
+    if (history.to_grow && patches && !work.effort.motion_alone) {
+        auto grown = grow(work, *tracking.registered, steps, in_vain);
+        if (!grown) return tl::unexpected(grown.error());
+        if (*grown) return std::move(**grown);
+        in_vain.growth = work.sequence.next_frame;
+    }
+
+    // 3. A T-frame, and how well it fits. Behind an I-frame it is not known yet how well its T-frames can fit; where
     // all are motion alone, it never is.
     if (work.effort.always_other_starts) follow_limbs_anyway(work, tracking);
     auto motion = code_and_judge(work, *tracking.registered, steps);
@@ -282,36 +312,39 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     if (apart) motion->lost = apart;
     const auto& may_repair = work.captured.may_repair;
     if (motion->lost && !due && !apart && may_repair && !may_repair())
-        return send(std::move(motion->coded), best_before);
+        return send(std::move(motion->coded), history.best_fit);
 
-    // 3. Where tracking is lost: limbs from another start.
-    const bool patches = may_be_patched(work, due);
+    // 4. Where tracking is lost: limbs from another start. Where surface comes and goes, what is far off is not shown,
+    // so that if there are none a patch may be left to the next frame: this one has taken its time.
     const bool was_lost = motion->lost.has_value();
     if (was_lost) {
         tracking.lost = true;
+        const bool looks = !just_in_vain(work, in_vain.limbs);
+        if (!apart && !looks) tracking.searched_limbs = true;
         if (auto ok = look_for_limbs(work, tracking, steps, patches, *motion); !ok) return tl::unexpected(ok.error());
+        if (work.configuration.tells_presence() && motion->lost && looks) {
+            in_vain.limbs = work.sequence.next_frame;
+            if (!due && !apart) return send(std::move(motion->coded), history.best_fit);
+        }
     }
 
-    // 4. Where it still is, or where surface was captured that is not tracked: a patch.
+    // 5. Where it still is: a patch.
     const auto& tracked = motion->coded.encoded;
     const auto anew = why_anew(work, motion->coded);
-    const bool grows = !motion->lost && work.configuration.tells_presence() && should_grow(work, motion->fit);
-    if (!anew && patches && ((motion->lost && was_lost) || grows)) {
-        if (grows && !motion->coded.of_reference) {
-            auto of_reference = code_for_patches(work, *tracking.registered, steps, tracked.near);
-            if (!of_reference) return tl::unexpected(of_reference.error());
-            motion->for_patches = std::move(*of_reference);
-        }
-        auto patched = patch(work, *tracking.registered, steps, motion->to_patch(), why_patched(motion->lost));
+    if (!anew && patches && motion->lost && was_lost) {
+        auto patched = patch(work, *tracking.registered, steps, motion->to_patch(), why_patched(*motion->lost));
         if (!patched) return tl::unexpected(patched.error());
-        if (*patched) return Frame(std::move(**patched));
+        if (*patched) {
+            (*patched)->in_vain = in_vain;
+            return Frame(std::move(**patched));
+        }
     }
 
-    // 5. The T-frame, or an I-frame: of the tracked mesh, where that is as good.
-    const bool best = !motion->lost && (best_before.value == 0 || motion->fit.rms < best_before);
-    const auto best_fit = best ? motion->fit.rms : best_before;
+    // 6. The T-frame, or an I-frame: of the tracked mesh, where that is as good.
+    const bool best = !motion->lost && (history.best_fit.value == 0 || motion->fit.rms < history.best_fit);
+    const auto best_fit = best ? motion->fit.rms : history.best_fit;
     const auto reason = why_intra(work, due, motion->lost, anew);
-    if (!reason) return send(std::move(motion->coded), best_fit);
+    if (!reason) return send(std::move(motion->coded), best_fit, should_grow(work, motion->fit, in_vain));
     const bool renewed = !anew && !motion->lost && may_be_renewed(work, steps, tracked.mesh);
     auto intra = renewed ? code_renewal(work, steps, tracked, *reason) : code_intra(work, steps, *reason);
     if (intra && !motion->lost) intra->best_fit = best_fit;

@@ -127,6 +127,7 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedPatch& patch) {
     out.history.best_fit = patch.best_fit;
     out.history.targets = std::move(patch.targets);
     out.history.presence = std::move(patch.presence);
+    out.history.in_vain = patch.in_vain;
     if (!patch.before_last.empty())
         out.history.gone_on = moved_on(before.deformable, patch.before_last, patch.last, in_use.deformable.handles);
     out.reference = std::move(*reference);

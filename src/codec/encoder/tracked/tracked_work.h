@@ -40,6 +40,13 @@ struct TrackedReference {
     DeformableMesh deformable;
 };
 
+// When what takes time was last tried in vain where surface comes and goes: numbers of frames. It is not tried again
+// at once, since what it is tried for is mostly still there in the next frame.
+struct VainAttempts {
+    std::optional<std::uint32_t> limbs;   // looking for lost ones
+    std::optional<std::uint32_t> growth;  // adding what was captured beside what is tracked
+};
+
 // What the T-frames since the reference leave for the next one.
 struct MotionHistory {
     std::optional<std::uint32_t> frame;          // number of the last one
@@ -52,6 +59,8 @@ struct MotionHistory {
     std::vector<RigidMotion> gone_on;  // behind a TP-frame: a start for each node of the new reference, from how the
                                        // surface there moved on the old one; else empty
     LatticeUnits best_fit;             // RMS of the best so far; 0: none yet
+    bool to_grow = false;  // whether so much was captured beside what is tracked that the next frame should add it
+    VainAttempts in_vain;
 };
 
 // The strategy's state between two frames.
@@ -101,6 +110,7 @@ struct TrackedPatch {
     PresenceHistory presence;                    // likewise
     std::vector<RigidMotion> before_last, last;  // of each node of the reference before, up to this frame
     LatticeUnits best_fit;                       // as of an I-frame
+    VainAttempts in_vain;                        // as of a T-frame
 };
 
 // The frame that is coded, and what is found of it before that. Attempts share it and leave it as it is.

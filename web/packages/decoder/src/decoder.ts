@@ -340,6 +340,12 @@ export class Decoder {
         return this.#frame();
     }
 
+    /** Derives now what the next frame will need of the last one: for who has time between two frames. What was lent of
+     *  the last frame ends. */
+    prepare(): void {
+        this.#check(this.#module.call('htvm_decoder_prepare', this.#handle));
+    }
+
     /** Forgets what was sent and not received, as for a seek. */
     discard(): void {
         this.#check(this.#module.call('htvm_decoder_discard', this.#handle));

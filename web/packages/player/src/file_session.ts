@@ -112,6 +112,7 @@ export class FileSession implements Session {
                 if (!frame) continue;
                 if (!(await this.#haveRoom(serial))) return;
                 this.#send(serial, frame, packet.timeUs, false);
+                this.#decoder.prepare();
                 this.#survey();
             }
             this.#checkTheEnd();

@@ -243,6 +243,7 @@ export class LiveSession implements Session {
         });
         if (how === 'frame') this.#sentUs = presentUs;
         this.#previewed = true;
+        if (!later) this.#decoder.prepare();
     }
 
     // While what the newest frame needs is decoded, its first frame is shown, at once, where there was no picture yet.

@@ -186,4 +186,9 @@ export class PacketDecoder {
             return { frame: null, error, decodeMs: this.#now() - begin };
         }
     }
+
+    /** Does a part of the next frame's work, once the last one was sent and nothing waits. */
+    prepare(): void {
+        this.decoder.prepare();
+    }
 }
