@@ -59,10 +59,11 @@ struct TrackingNumbers {
     double much_uncovered = 0.03;        // share of the captured surface from which on it is added at once
     AdultMillimetres grown_from{20};     // side of a square as large as what is uncovered in a region, from which on it
     int grown_after = 6;                 // is added, these many frames behind the last patch,
-    AdultMillimetres grown_at_once{80};  // or at once; always by the frame behind the one in which that is seen
-    int again_after = 6;                 // frames after which that, or looking for limbs, is tried again if it was vain
-    int forgotten_after = 150;           // frames for which a vertex was not seen: the next I-frame leaves it out
-    double most_grown = 2.5;             // as most_renewed_vertices, where the reference grows with what is seen
+    AdultMillimetres grown_at_once{80};  // or at once
+    int attempts_to_grow = 3;            // SurfacePatchOptions::attempts: what does not fit by then can wait
+    int again_after = 6;        // frames after which that, or looking for limbs, is tried again where it was vain
+    int forgotten_after = 150;  // frames for which a vertex was not seen: the next I-frame leaves it out
+    double most_grown = 2.5;    // as most_renewed_vertices, where the reference grows with what is seen
 
     // ---- When an I-frame is sent
     double most_others = 0.1;  // share of the vertices that have other texture coordinates: the atlas is laid out anew

@@ -1109,8 +1109,7 @@ std::optional<SurfacePatch> SurfacePatchSearch::find(LatticeUnits region_lost) c
     if (std::find(removed.begin(), removed.end(), true) == removed.end() && !m.uncovered_alone) return std::nullopt;
     // Surface that comes and goes has borders everywhere: what cannot be joined stays open.
     const bool open = !m.surface.from_border.empty();
-    const int attempts = open ? std::min(options.attempts, options.attempts_where_open) : options.attempts;
-    for (int attempt = 0; attempt < attempts; ++attempt) {
+    for (int attempt = 0; attempt < options.attempts; ++attempt) {
         tidy(removed, m.decoded, *m.sides, options);
         const auto stays = remainder_of(m.decoded, *m.sides, removed);
         double area = 0;
@@ -1120,7 +1119,7 @@ std::optional<SurfacePatch> SurfacePatchSearch::find(LatticeUnits region_lost) c
         const auto piece =
             simplified_piece(cut_piece(outside, *m.capture, options), m.captured, m.surface, options.simplification);
         auto join = Joiner(m.decoded, *m.sides, stays, piece, m.edge, *m.capture, options).run();
-        if (join.unclear.empty() || (open && attempt + 1 == attempts)) {
+        if (join.unclear.empty() || (open && attempt + 1 == options.attempts)) {
             if (piece.triangles.empty() && open) return std::nullopt;
             SurfacePatch out;
             out.removed = std::move(removed);

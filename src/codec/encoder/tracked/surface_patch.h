@@ -31,8 +31,7 @@ struct SurfacePatchOptions {
     double stretch = 3;       // a triangle is lost, too, where a side is longer than at rest by this factor
     double gap = 0.5;         // between what stays and the piece, before they are joined: in mean edges there
     double most_share = 0.3;  // of the tracked mesh's area that may go
-    int attempts = 5;  // where the two borders do not fit together, more goes around them and they are cut again;
-    int attempts_where_open = 3;  // so often where surface comes and goes: what still does not fit is not joined
+    int attempts = 5;         // where the two borders do not fit together, more goes around them and they are cut again
     SimplifiedReferenceOptions simplification;  // of the piece
     Threads threads = {};                       // their number does not change the result
 };

@@ -95,7 +95,7 @@ bool may_be_renewed(const TrackedWork& work, const FrameSteps& steps, const Latt
 
 // ---- Patches --------------------------------------------------------------------------------------------------------
 
-SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& steps) {
+SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& steps, FrameReason reason) {
     const auto& configuration = work.configuration;
     const auto& scale = configuration.scale;
     SurfacePatchOptions out;
@@ -105,6 +105,7 @@ SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& ste
     out.reach = scale.on_lattice(numbers.reach);
     out.speck = scale.on_lattice(numbers.speck);
     out.most_share = configuration.options.tracked.patch_share;
+    if (reason == FrameReason::border) out.attempts = numbers.attempts_to_grow;
     out.simplification = simplification_options(configuration, steps);
     out.threads = configuration.threads;
     return out;
@@ -122,7 +123,7 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
     StageClock measuring(work.stages);
     const SurfacePatchSearch search(
         {tracked.mesh, reference.decoded.by_nodes->mesh.positions, tracked.near, tracked.seen}, work.captured.mesh,
-        work.surface, patch_options(work, steps));
+        work.surface, patch_options(work, steps, reason));
     measuring.done("patch");
     for (const auto region_lost : {lost, LatticeUnits(0)}) {
         if (region_lost.value == 0 && reason == FrameReason::border) break;  // nothing is lost
@@ -150,16 +151,18 @@ bool just_in_vain(const TrackedWork& work, const std::optional<std::uint32_t>& l
     return last && std::int64_t{work.sequence.next_frame} - *last < numbers.again_after;
 }
 
-// Whether so much was captured beside what is tracked that the reference should grow: at once where it is much, else
-// now and then, since a patch takes the time of two frames. That is said one frame ahead: the T-frame that shows it is
-// coded by then.
-bool should_grow(const TrackedWork& work, const TrackedFit& fit, const VainAttempts& in_vain) {
-    if (!work.configuration.tells_presence() || just_in_vain(work, in_vain.growth)) return false;
+// When the reference should grow by what was captured beside it: at once where that is much, as an arm that comes into
+// view; else now and then, by the next frame, since a patch takes the time of two frames and the T-frame that shows it
+// is coded by then.
+enum class Growth { none, next, now };
+Growth growth_due(const TrackedWork& work, const TrackedFit& fit, const VainAttempts& in_vain) {
+    if (!work.configuration.tells_presence() || just_in_vain(work, in_vain.growth)) return Growth::none;
     const auto since = std::int64_t{work.sequence.next_frame} - work.reference->decoded.number;
     const auto& scale = work.configuration.scale;
     const auto wide = fit.widest_uncovered;
-    return fit.uncovered_share > numbers.much_uncovered || wide > scale.on_lattice(numbers.grown_at_once) ||
-           (since >= numbers.grown_after && wide > scale.on_lattice(numbers.grown_from));
+    if (fit.uncovered_share > numbers.much_uncovered || wide > scale.on_lattice(numbers.grown_at_once))
+        return Growth::now;
+    return since >= numbers.grown_after && wide > scale.on_lattice(numbers.grown_from) ? Growth::next : Growth::none;
 }
 
 // ---- The steps of a choice ------------------------------------------------------------------------------------------
@@ -260,10 +263,11 @@ std::optional<FrameReason> why_intra(const TrackedWork& work, bool due, std::opt
     return std::nullopt;
 }
 
-// A TP-frame that adds what was captured beside what is tracked; nothing if there is none to add.
+// A TP-frame that adds what was captured beside what is tracked; nothing if there is none to add. near: as of
+// code_for_patches().
 Result<std::optional<Frame>> grow(const TrackedWork& work, const NodeRegistration& registered, const FrameSteps& steps,
-                                  const VainAttempts& in_vain) {
-    auto tracked = code_for_patches(work, registered, steps, {});
+                                  std::span<const std::uint32_t> near, const VainAttempts& in_vain) {
+    auto tracked = code_for_patches(work, registered, steps, near);
     if (!tracked) return tl::unexpected(tracked.error());
     auto patched = patch(work, registered, steps, *tracked, FrameReason::border);
     if (!patched) return tl::unexpected(patched.error());
@@ -297,7 +301,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     // 2. Where the frame before showed surface that is not tracked: a patch that adds it.
     const bool patches = may_be_patched(work, due);
     if (history.to_grow && patches && !work.effort.motion_alone) {
-        auto grown = grow(work, *tracking.registered, steps, in_vain);
+        auto grown = grow(work, *tracking.registered, steps, {}, in_vain);
         if (!grown) return tl::unexpected(grown.error());
         if (*grown) return std::move(**grown);
         in_vain.growth = work.sequence.next_frame;
@@ -328,7 +332,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         }
     }
 
-    // 5. Where it still is: a patch.
+    // 5. Where it still is, or where much was captured that is not tracked: a patch.
     const auto& tracked = motion->coded.encoded;
     const auto anew = why_anew(work, motion->coded);
     if (!anew && patches && motion->lost && was_lost) {
@@ -340,11 +344,19 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         }
     }
 
+    const auto growth = motion->lost ? Growth::none : growth_due(work, motion->fit, in_vain);
+    if (!anew && patches && growth == Growth::now) {
+        auto grown = grow(work, *tracking.registered, steps, tracked.near, in_vain);
+        if (!grown) return tl::unexpected(grown.error());
+        if (*grown) return std::move(**grown);
+        in_vain.growth = work.sequence.next_frame;
+    }
+
     // 6. The T-frame, or an I-frame: of the tracked mesh, where that is as good.
     const bool best = !motion->lost && (history.best_fit.value == 0 || motion->fit.rms < history.best_fit);
     const auto best_fit = best ? motion->fit.rms : history.best_fit;
     const auto reason = why_intra(work, due, motion->lost, anew);
-    if (!reason) return send(std::move(motion->coded), best_fit, should_grow(work, motion->fit, in_vain));
+    if (!reason) return send(std::move(motion->coded), best_fit, growth == Growth::next);
     const bool renewed = !anew && !motion->lost && may_be_renewed(work, steps, tracked.mesh);
     auto intra = renewed ? code_renewal(work, steps, tracked, *reason) : code_intra(work, steps, *reason);
     if (intra && !motion->lost) intra->best_fit = best_fit;
