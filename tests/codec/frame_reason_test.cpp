@@ -151,12 +151,12 @@ TEST(FrameReasons, TellOfACut) {
     EXPECT_EQ(reasons_of(encode(sequence, patched_options())), (std::vector{none, none, cut, none}));
 }
 
-TEST(FrameReasons, TellOfSurfaceThatCameIntoViewInTheFrameBefore) {
+TEST(FrameReasons, TellOfSurfaceThatComesIntoView) {
     auto options = patched_options();
     options.geometry_step = 8;  // so coarse that it does not matter how the reference is drawn to what is new
     const auto coded = encode(seen_down_to({900, 900, 600, 600}), options);
-    EXPECT_EQ(coded.infos[3].type, FrameType::patched);
-    EXPECT_EQ(reasons_of(coded), (std::vector{none, none, none, border}));
+    EXPECT_EQ(coded.infos[2].type, FrameType::patched);
+    EXPECT_EQ(reasons_of(coded), (std::vector{none, none, border, none}));
 }
 
 TEST(FrameReasons, TellOfATextureThatIsLaidOutAnew) {
