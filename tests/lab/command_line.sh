@@ -46,6 +46,7 @@ expect 0 "htvm-lab: 2 of 2 results" "$lab" rd capture -o rd -q 40 --coders tfan,
 # How long frames take to decode, by kind.
 "$htvm" encode capture -o stream.htvm --quiet >/dev/null 2>&1
 expect 0 "T-frames                   1" "$lab" decoding stream.htvm --repeat 1
+expect 0 "between frames, " "$lab" decoding stream.htvm --repeat 1 --prepare
 "$lab" decoding stream.htvm --repeat 1 --json 2>/dev/null | grep -q '"p99_over_p50"' ||
     { echo "FAILED: no percentiles as JSON"; failures=$((failures + 1)); }
 expect 1 "nowhere.htvm" "$lab" decoding nowhere.htvm
