@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
         "Or with nothing at all: they make a synthetic one, whose truth is known.\n"
         "  htvm-lab events --motion fast              whether hands and feet are followed\n"
         "  htvm-lab endure --minutes 5                whether anything grows with time";
-    program.commands = {add_rd, add_decoding, add_reproduce, add_events, add_endure, add_bake};
+    program.commands = {add_rd, add_decoding, add_reproduce, add_events, add_endure, add_bake, add_hierarchy};
     for (const char* name : {"synth", "encode", "decode", "info", "calibrate", "compare"})
         program.elsewhere[name] = std::string("htvm ") + name;
     return run_program(program, argc, argv);

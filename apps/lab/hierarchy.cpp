@@ -1,0 +1,220 @@
+// htvm-lab hierarchy: what I-frames take beside a base mesh with levels of displacements, at equal error.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "codec/encoder/surface_levels.h"
+#include "codec/encoder/tracked/captured_surface.h"
+#include "codec/format/sequence.h"
+#include "codec/intra/intra_frame.h"
+#include "command_line/capture.h"
+#include "command_line/terminal.h"
+#include "commands.h"
+#include "coders.h"
+#include "core/lattice.h"
+#include "htvm/encoder.hpp"
+#include "metrics/surface_error.h"
+#include "surface/simplification.h"
+
+namespace htvm::lab {
+
+using namespace app;
+using namespace internal;
+namespace {
+
+struct Options {
+    CaptureOptions capture;
+    std::vector<std::size_t> frames{0};
+    std::vector<double> qualities{20, 30, 40, 50, 60, 70, 80, 90, 100};
+    std::vector<double> base_errors{3};   // mm
+    std::vector<double> base_steps{4};    // mm
+    std::vector<double> steps{1};         // mm
+    std::vector<double> edges{10};        // mm
+    std::uint32_t levels = 3, coarser = 12;
+    double lambda = 0.15;
+    std::uint32_t butterfly = 0, tangents = 8;
+    bool json = false;
+};
+
+struct Point {
+    std::string setting;
+    std::size_t bytes = 0, vertices = 0;
+    double m2 = 0, forward = 0, backward = 0;
+    std::string detail;
+};
+
+constexpr std::uint64_t samples = 200000;
+
+Result<Point> intra_point(const Mesh& mesh, double quality) {
+    EncoderOptions options = default_options(Profile::tracked);
+    options.tracked.denoise = Denoising::off;
+    options.geometry_step = quality_point(quality).geometry_step;
+    auto encoder = Encoder::create(options);
+    if (!encoder) return tl::unexpected(encoder.error());
+    if (auto ok = encoder->push(mesh, nullptr, 0, true); !ok) return tl::unexpected(ok.error());
+    if (auto ok = encoder->finish(); !ok) return tl::unexpected(ok.error());
+    Point out;
+    out.setting = fmt::format("q{:g}", quality);
+    out.bytes = encoder->last_frame().bytes.total();
+    out.vertices = encoder->last_frame().vertices;
+    const auto error = surface_error(mesh, encoder->reconstruction(), {.samples = samples});
+    if (!error) return tl::unexpected(error.error());
+    out.forward = error->forward.rms;
+    out.backward = error->backward.rms;
+    out.m2 = m2(*error);
+    return out;
+}
+
+LatticeMesh base_mesh(const LatticeMesh& welded_mesh, double error) {
+    std::vector<Eigen::Vector3d> points;
+    for (const auto p : welded_mesh.positions) points.emplace_back(p.x, p.y, p.z);
+    SimplificationOptions options;
+    options.surface_error = error;
+    const auto simplified = simplify(points, welded_mesh.triangles, {}, options);
+    LatticeMesh out;
+    for (const auto& p : simplified.positions)
+        out.positions.push_back({within_lattice(std::llround(p.x())), within_lattice(std::llround(p.y())),
+                                 within_lattice(std::llround(p.z()))});
+    out.triangles = simplified.triangles;
+    return out;
+}
+
+Result<Point> levels_point(const Mesh& mesh, const Lattice& lattice, const LatticeMesh& base,
+                           const SurfaceIndex& captured, double base_step, const SurfaceLevelsOptions& options) {
+    FramePayload payload;
+    IntraFrameOptions intra;
+    intra.geometry_step = std::max(1, static_cast<std::int32_t>(std::lround(base_step * 16)));
+    intra.merge_duplicates = false;
+    const auto decoded = encode_intra_frame(base, intra, payload);
+    if (!decoded) return tl::unexpected(decoded.error());
+    const auto coded = encode_surface_levels(captured, *decoded, options);
+    const auto again = decode_surface_levels(coded.run, *decoded, std::size_t{1} << 24);
+    if (!again) return tl::unexpected(again.error());
+    if (again->positions != coded.surface.positions || again->triangles != coded.surface.triangles)
+        return fail(ErrorKind::corrupt_stream, "what was decoded is not what was encoded");
+    Point out;
+    const std::size_t base_bytes = write_frame_payload(payload).size();
+    out.bytes = base_bytes + coded.run.size() + 2 + packet_overhead;
+    out.vertices = coded.surface.positions.size();
+    LatticeMesh shown;
+    shown.positions = coded.surface.positions;
+    shown.triangles = coded.surface.triangles;
+    const auto error = surface_error(mesh, to_mesh(shown, lattice), {.samples = samples});
+    if (!error) return tl::unexpected(error.error());
+    out.forward = error->forward.rms;
+    out.backward = error->backward.rms;
+    out.m2 = m2(*error);
+    out.detail = fmt::format("base {} v, fans {} geo {};", decoded->positions.size(), payload.of(Layer::fans).size(),
+                             payload.of(Layer::geometry).size());
+    for (const auto& part : coded.parts)
+        out.detail += fmt::format(" {}/{}:{:.0f}", part.moved, part.vertices, part.bytes);
+    return out;
+}
+
+double bytes_at(std::vector<Point> points, double m2) {
+    // The lower hull in (log m2, log bytes).
+    std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.m2 < b.m2; });
+    double best = 0;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        for (std::size_t j = i + 1; j < points.size(); ++j) {
+            if (!(points[i].m2 <= m2 && m2 <= points[j].m2)) continue;
+            const double x0 = std::log(points[i].m2), x1 = std::log(points[j].m2);
+            const double y0 = std::log(static_cast<double>(points[i].bytes)),
+                         y1 = std::log(static_cast<double>(points[j].bytes));
+            const double t = x1 > x0 ? (std::log(m2) - x0) / (x1 - x0) : 0;
+            const double bytes = std::exp(y0 + t * (y1 - y0));
+            if (best == 0 || bytes < best) best = bytes;
+        }
+    return best;
+}
+
+void print(const Point& p) {
+    fmt::print("{:34} {:>7} B {:>7} v  M2 {:.3f} ({:.3f} {:.3f})  {}\n", p.setting, p.bytes, p.vertices, p.m2,
+               p.forward, p.backward, p.detail);
+    std::fflush(stdout);
+}
+
+Result<void> run_hierarchy(const Options& options) {
+    auto capture = Capture::open(options.capture);
+    if (!capture) return tl::unexpected(capture.error());
+    std::size_t number = 0;
+    while (true) {
+        auto next = capture->next();
+        if (!next) return tl::unexpected(next.error());
+        if (!*next) break;
+        if (std::find(options.frames.begin(), options.frames.end(), number++) == options.frames.end()) continue;
+        Mesh mesh = std::move(**next);
+        mesh.colours.clear();
+        mesh.normals.clear();
+        mesh.texcoords.clear();
+        std::vector<Point> today, levelled;
+        for (const double q : options.qualities) {
+            auto point = intra_point(mesh, q);
+            if (!point) return tl::unexpected(point.error());
+            print(*point);
+            today.push_back(std::move(*point));
+        }
+        Lattice lattice;
+        const auto origin = lattice_origin(mesh);
+        if (!origin) return tl::unexpected(origin.error());
+        lattice.origin = *origin;
+        const auto whole = to_lattice(mesh, lattice);
+        if (!whole) return tl::unexpected(whole.error());
+        const auto surface_mesh = welded(*whole, at_same_place(*whole));
+        const double edge = mean_edge(surface_mesh.positions, surface_mesh.triangles, 8);
+        const SurfaceIndex captured(points_of(surface_mesh.positions), surface_mesh.triangles,
+                                    {.cell = static_cast<float>(2 * edge)});
+        for (const double error : options.base_errors) {
+            const auto base = base_mesh(surface_mesh, 16 * error);
+            for (const double base_step : options.base_steps)
+                for (const double finest : options.edges)
+                    for (const double step : options.steps) {
+                        SurfaceLevelsOptions chosen;
+                        chosen.levels.levels = options.levels;
+                        chosen.levels.coarser = options.coarser;
+                        chosen.levels.step = static_cast<std::uint32_t>(std::lround(256 * step));
+                        chosen.levels.longest_edge = static_cast<std::uint32_t>(std::lround(16 * finest));
+                        chosen.lambda = options.lambda;
+                        chosen.rules = {{options.butterfly, options.tangents}};
+                        auto point = levels_point(mesh, lattice, base, captured, base_step, chosen);
+                        if (!point) return tl::unexpected(point.error());
+                        point->setting = fmt::format("base {:g}/{:g} edge {:g} step {:g}", error, base_step, finest, step);
+                        print(*point);
+                        levelled.push_back(std::move(*point));
+                    }
+        }
+        for (const double at : {0.4, 0.8}) {
+            const double a = bytes_at(today, at), b = bytes_at(levelled, at);
+            fmt::print("M2 {:.1f}: today {:.0f}, levels {:.0f}, ratio {:.3f}\n", at, a, b, a > 0 ? b / a : 0);
+        }
+    }
+    return {};
+}
+
+}  // namespace
+
+void add_hierarchy(CLI::App& app, app::Run& run) {
+    auto options = std::make_shared<Options>();
+    auto* command = app.add_subcommand("hierarchy", "I-frames beside a base mesh with levels of displacements");
+    add_capture_options(*command, options->capture);
+    command->add_option("--at", options->frames, "Frames")->delimiter(',');
+    command->add_option("-q,--quality", options->qualities, "Qualities of I-frames")->delimiter(',');
+    command->add_option("--base-errors", options->base_errors, "mm")->delimiter(',');
+    command->add_option("--base-steps", options->base_steps, "mm")->delimiter(',');
+    command->add_option("--steps", options->steps, "mm")->delimiter(',');
+    command->add_option("--edges", options->edges, "mm")->delimiter(',');
+    command->add_option("--levels", options->levels, "");
+    command->add_option("--coarser", options->coarser, "");
+    command->add_option("--lambda", options->lambda, "");
+    command->add_option("--butterfly", options->butterfly, "");
+    command->add_option("--tangents", options->tangents, "");
+    command->callback([options, &run] { run = [options] { return run_hierarchy(*options); }; });
+}
+
+}  // namespace htvm::lab

@@ -1,0 +1,39 @@
+// Finds what surface levels say of a captured surface: where the vertices of each level come to lie on it, and what of
+// that is worth its bits.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "codec/intra/surface_levels.h"
+#include "core/lattice.h"
+#include "core/length.h"
+#include "core/thread.h"
+#include "surface/surface_index.h"
+
+namespace htvm::internal {
+
+struct SurfaceLevelsOptions {
+    SurfaceLevels levels;  // without rules: the best are found
+    LatticeUnits reach{480};  // how far from where it is expected a vertex's place on the surface is looked for
+    double lambda = 0.15;  // squared steps that a bit must spare
+    std::vector<SubdivisionRule> rules;  // to choose from, or one a level if `fixed_rules`
+    Threads threads = {};
+};
+
+struct EncodedSurfaceLevels {
+    std::vector<std::uint8_t> run;
+    LeveledSurface surface;             // that the decoder will have
+    std::vector<SubdivisionRule> rules;
+    struct Part {
+        std::size_t vertices = 0, moved = 0;
+        double bytes = 0;
+    };
+    std::vector<Part> parts;  // the base's displacements, then each level's
+};
+
+// captured: with a grid for searches by direction. base: decoded.
+EncodedSurfaceLevels encode_surface_levels(const SurfaceIndex& captured, const LatticeMesh& base,
+                                           const SurfaceLevelsOptions& options);
+
+}  // namespace htvm::internal
