@@ -37,7 +37,10 @@ struct Options {
     std::vector<double> steps{1};         // mm
     std::vector<double> edges{10};        // mm
     std::uint32_t levels = 3, coarser = 12;
-    double lambda = 0.15;
+    double lambda = 0.12, least_moved = 0.7;
+    int rounds = 5, sweeps = 6;
+    double back = 1, farthest = 0.4, last_reach = 6;
+    float agreement = 0.3F;
     std::uint32_t butterfly = 0, tangents = 8;
     bool json = false;
 };
@@ -112,6 +115,18 @@ Result<Point> levels_point(const Mesh& mesh, const Lattice& lattice, const Latti
     out.m2 = m2(*error);
     out.detail = fmt::format("base {} v, fans {} geo {};", decoded->positions.size(), payload.of(Layer::fans).size(),
                              payload.of(Layer::geometry).size());
+    {
+        const SurfaceIndex decoded_index(points_of(shown.positions), shown.triangles);
+        double all = 0, two = 0, four = 0;
+        std::size_t n2 = 0;
+        for (const auto& p : captured.positions) {
+            const double d = decoded_index.closest(p).squared_distance / 256.0;
+            all += d;
+            if (d > 4) two += d, ++n2;
+            if (d > 16) four += d;
+        }
+        out.detail += fmt::format(" [>2mm {:.2f} ({:.4f} of v) >4mm {:.2f}]", two / all, static_cast<double>(n2) / static_cast<double>(captured.positions.size()), four / all);
+    }
     for (const auto& part : coded.parts)
         out.detail += fmt::format(" {}/{}:{:.0f}", part.moved, part.vertices, part.bytes);
     return out;
@@ -176,12 +191,19 @@ Result<void> run_hierarchy(const Options& options) {
                 for (const double finest : options.edges)
                     for (const double step : options.steps) {
                         SurfaceLevelsOptions chosen;
-                        chosen.levels.levels = options.levels;
+                        chosen.levels.depth.levels = options.levels;
                         chosen.levels.coarser = options.coarser;
                         chosen.levels.step = static_cast<std::uint32_t>(std::lround(256 * step));
-                        chosen.levels.longest_edge = static_cast<std::uint32_t>(std::lround(16 * finest));
+                        chosen.levels.depth.longest_edge = static_cast<std::uint32_t>(std::lround(16 * finest));
                         chosen.lambda = options.lambda;
-                        chosen.rules = {{options.butterfly, options.tangents}};
+                        chosen.levels.rules.fill({options.butterfly, options.tangents});
+                        chosen.fit.least_moved = options.least_moved;
+                        chosen.rounds = options.rounds;
+                        chosen.fit.last_reach = LatticeUnits(16 * options.last_reach);
+                        chosen.fit.farthest = options.farthest;
+                        chosen.fit.agreement = options.agreement;
+                        chosen.fit.back = options.back;
+                        chosen.fit.sweeps = options.sweeps;
                         auto point = levels_point(mesh, lattice, base, captured, base_step, chosen);
                         if (!point) return tl::unexpected(point.error());
                         point->setting = fmt::format("base {:g}/{:g} edge {:g} step {:g}", error, base_step, finest, step);
@@ -211,6 +233,13 @@ void add_hierarchy(CLI::App& app, app::Run& run) {
     command->add_option("--edges", options->edges, "mm")->delimiter(',');
     command->add_option("--levels", options->levels, "");
     command->add_option("--coarser", options->coarser, "");
+    command->add_option("--rounds", options->rounds, "");
+    command->add_option("--least-moved", options->least_moved, "");
+    command->add_option("--back", options->back, "");
+    command->add_option("--sweeps", options->sweeps, "");
+    command->add_option("--farthest", options->farthest, "");
+    command->add_option("--last-reach", options->last_reach, "");
+    command->add_option("--agreement", options->agreement, "");
     command->add_option("--lambda", options->lambda, "");
     command->add_option("--butterfly", options->butterfly, "");
     command->add_option("--tangents", options->tangents, "");

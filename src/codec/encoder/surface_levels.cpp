@@ -43,43 +43,19 @@ double cost_of(const DisplacementModels& m, const DisplacementContext& c, std::i
     return bits;
 }
 
-// The value that is worth its bits, for a displacement of so many steps.
+// The value that is worth its bits, for a displacement of so many steps. weight: of a squared step.
 std::int32_t chosen_value(const DisplacementModels& models, const DisplacementContext& context, double steps,
-                          double lambda) {
+                          double weight, double lambda) {
     const auto nearest = static_cast<std::int32_t>(std::lround(std::clamp(steps, -1e5, 1e5)));
     std::int32_t best = 0;
-    double least = steps * steps + lambda * cost_of(models, context, 0);
+    double least = weight * steps * steps + lambda * cost_of(models, context, 0);
     for (const auto candidate : {nearest, nearest - (nearest > 0) + (nearest < 0)}) {
         if (candidate == 0) continue;
-        const double off = steps - candidate, price = off * off + lambda * cost_of(models, context, candidate);
+        const double off = steps - candidate;
+        const double price = weight * off * off + lambda * cost_of(models, context, candidate);
         if (price < least) least = price, best = candidate;
     }
     return best;
-}
-
-// How far along the normals the surface is from some points, in lattice units.
-std::vector<double> distances_along(const SurfaceIndex& captured, std::span<const Vector3d> points,
-                                    std::span<const Vector3d> normals, const SurfaceLevelsOptions& options) {
-    std::vector<double> out(points.size(), 0);
-    std::vector<Point3f> queries(points.size()), facing(points.size());
-    std::vector<std::uint32_t> guesses(points.size(), OrientedPoints::no_point);
-    for (std::size_t i = 0; i < points.size(); ++i) facing[i] = to_floats(normals[i]);
-    for (int round = 0; round < 3; ++round) {
-        for (std::size_t i = 0; i < points.size(); ++i) queries[i] = to_floats(points[i] + normals[i] * out[i]);
-        const auto found = closest_facing(captured, queries, facing,
-                                          {.reach = static_cast<float>(options.reach.value), .agreement = 0.3F},
-                                          options.threads, guesses);
-        for (std::size_t i = 0; i < points.size(); ++i)
-            if (found[i].found())
-                out[i] += dot(to_vector(found[i].point) - to_vector(queries[i]), normals[i]);
-    }
-    return out;
-}
-
-double squared_misses(const SurfaceIndex& captured, const LevelsWalk& walk, const SurfaceLevelsOptions& options) {
-    double sum = 0;
-    for (const double d : distances_along(captured, walk.expected, walk.normal, options)) sum += std::min(d * d, 1e4);
-    return sum;
 }
 
 }  // namespace
@@ -90,52 +66,38 @@ EncodedSurfaceLevels encode_surface_levels(const SurfaceIndex& captured, const L
     RangeEncoder encoder;
     WritingCoder<RangeEncoder> coder{encoder};
     const auto levels = code_levels_header(coder, options.levels);
-    LevelsWalk walk(base);
+    const auto subdivision = *subdivide(base, levels.depth, std::size_t{1} << 24);
+    SurfaceFit fit(captured, base, subdivision, levels, options.fit);
+    fit.improve(0, options.rounds);
+    std::vector<std::int32_t> values;
+    DisplacementModels models;
+    auto& positions = out.surface.positions;
     std::size_t position = 0;
-    const auto add_part = [&](std::size_t from, std::size_t moved) {
-        out.parts.push_back({walk.positions.size() - from, moved, static_cast<double>(encoder.position() - position)});
+    for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) {
+        const auto* level = k > 0 ? &subdivision[k - 1] : nullptr;
+        const auto& above = k > 1 ? subdivision[k - 2].triangles : base.triangles;
+        const auto expected = level ? expected_level(*level, positions, above, levels.rules[k - 1]) : expected_base(base);
+        const std::size_t first = positions.size();
+        const auto step = step_at(levels, k);
+        const double in_steps = (1 << displacement_bits) / static_cast<double>(step);
+        const double weight = static_cast<double>(step) * step / (static_cast<double>(levels.step) * levels.step);
+        std::size_t moved = 0;
+        code_displacements(coder, models, level, k, expected, step, positions, values,
+                           [&](std::size_t i, const DisplacementContext& context) {
+                               const std::size_t v = first + i;
+                               const auto value =
+                                   chosen_value(models, context, fit.displacements()[v] * in_steps,
+                                                weight * std::clamp(fit.weights()[v], 0.25, 64.0), options.lambda);
+                               moved += value != 0;
+                               fit.set(v, value / in_steps);
+                               return value;
+                           });
+        if (k < levels.depth.levels) fit.improve(k + std::size_t{1}, 1);
+        out.parts.push_back({positions.size() - first, moved, static_cast<double>(encoder.position() - position)});
         position = encoder.position();
-    };
-    std::size_t moved = 0;
-    {
-        std::vector<Vector3d> points;
-        for (const auto p : walk.positions) points.push_back(to_vector(p));
-        const auto wanted = distances_along(captured, points, vertex_normals(walk.positions, walk.triangles), options);
-        code_base_displacements(coder, walk, levels,
-                                [&](std::size_t v, const Vector3d&, std::uint32_t step, const DisplacementContext& c) {
-                                    const auto value = chosen_value(walk.models, c, wanted[v] * 16 / step, options.lambda);
-                                    moved += value != 0;
-                                    return value;
-                                });
-        add_part(0, moved);
-    }
-    for (std::uint32_t k = 1; k <= levels.levels; ++k) {
-        walk.begin_level(levels, k, std::size_t{1} << 24);
-        SubdivisionRule best = options.rules.front();
-        double least = -1;
-        for (const auto& rule : options.rules) {
-            if (options.rules.size() == 1) break;
-            walk.expect(rule);
-            const double misses = squared_misses(captured, walk, options);
-            if (least < 0 || misses < least) least = misses, best = rule;
-        }
-        out.rules.push_back(code_rule(coder, best));
-        walk.expect(best);
-        const auto wanted = distances_along(captured, walk.expected, walk.normal, options);
-        moved = 0;
-        code_level_displacements(coder, walk, levels, k,
-                                 [&](std::size_t i, std::uint32_t step, const DisplacementContext& c) {
-                                     const auto value =
-                                         chosen_value(walk.models, c, wanted[i] * 16 / step, options.lambda);
-                                     moved += value != 0;
-                                     return value;
-                                 });
-        const auto from = walk.first;
-        walk.end_level();
-        add_part(from, moved);
     }
     out.run = encoder.finish();
-    out.surface = {std::move(walk.positions), std::move(walk.triangles)};
+    out.surface.triangles = subdivision.empty() ? base.triangles : subdivision.back().triangles;
     return out;
 }
 

@@ -5,26 +5,23 @@
 #include <cstdint>
 #include <vector>
 
+#include "codec/encoder/surface_levels_fit.h"
 #include "codec/intra/surface_levels.h"
 #include "core/lattice.h"
-#include "core/length.h"
-#include "core/thread.h"
 #include "surface/surface_index.h"
 
 namespace htvm::internal {
 
 struct SurfaceLevelsOptions {
-    SurfaceLevels levels;  // without rules: the best are found
-    LatticeUnits reach{480};  // how far from where it is expected a vertex's place on the surface is looked for
-    double lambda = 0.15;  // squared steps that a bit must spare
-    std::vector<SubdivisionRule> rules;  // to choose from, or one a level if `fixed_rules`
-    Threads threads = {};
+    SurfaceLevels levels;
+    double lambda = 0.12;  // squared steps that a bit must spare
+    int rounds = 5;        // of the fit
+    SurfaceFitOptions fit;
 };
 
 struct EncodedSurfaceLevels {
     std::vector<std::uint8_t> run;
-    LeveledSurface surface;             // that the decoder will have
-    std::vector<SubdivisionRule> rules;
+    LeveledSurface surface;  // that the decoder will have
     struct Part {
         std::size_t vertices = 0, moved = 0;
         double bytes = 0;

@@ -163,7 +163,7 @@ Vector3d tangents_offset(std::span<const LatticePoint> positions, std::span<cons
     return (at_b * dot(edge, at_b) - at_a * dot(edge, at_a)) * 0.125;
 }
 
-Vector3d predicted_vertex(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
+Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                           const EdgeStencil& stencil, const SubdivisionRule& rule) {
     Vector3d out = (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
     if (rule.butterfly > 0) {
@@ -211,6 +211,46 @@ std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const
             out.push_back({ca, bc, c});
             out.push_back({ab, bc, ca});
         }
+    }
+    return out;
+}
+
+std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
+                                                       std::size_t most_vertices) {
+    std::vector<SubdivisionLevel> out;
+    // Where vertices lie on the base: halves of integers at most most_levels times, so exact.
+    std::vector<Vector3d> flat;
+    for (const auto p : base.positions) flat.push_back(to_vector(p));
+    std::vector<std::uint32_t> split, vertex_of_edge;
+    for (std::uint32_t k = 1; k <= depth.levels; ++k) {
+        const std::span<const Triangle> triangles = out.empty() ? base.triangles : out.back().triangles;
+        SubdivisionLevel level;
+        level.first = static_cast<std::uint32_t>(flat.size());
+        const auto edges = find_edges(flat.size(), triangles);
+        const double longest = static_cast<double>(std::int64_t{depth.longest_edge} << (depth.levels - k));
+        split.clear();
+        vertex_of_edge.assign(edges.size(), no_element);
+        for (std::uint32_t e = 0; e < edges.size(); ++e) {
+            const Vector3d side = flat[edges.ends[e][1]] - flat[edges.ends[e][0]];
+            if (!(dot(side, side) > longest * longest)) continue;
+            vertex_of_edge[e] = static_cast<std::uint32_t>(level.first + split.size());
+            split.push_back(e);
+        }
+        if (split.size() > most_vertices - std::min<std::size_t>(level.first, most_vertices)) return std::nullopt;
+        level.stencils = edge_stencils(flat.size(), triangles, edges, split);
+        for (const auto own : split) {
+            std::array<std::uint32_t, 4> beside{no_element, no_element, no_element, no_element};
+            std::size_t count = 0;
+            for (const auto t : edges.triangles[own]) {
+                if (t == no_element) continue;
+                for (const auto e : edges.of_triangle[t])
+                    if (e < own && vertex_of_edge[e] != no_element) beside[count++] = vertex_of_edge[e];
+            }
+            level.beside.push_back(beside);
+        }
+        level.triangles = split_triangles(triangles, edges, vertex_of_edge);
+        for (const auto e : split) flat.push_back((flat[edges.ends[e][0]] + flat[edges.ends[e][1]]) * 0.5);
+        out.push_back(std::move(level));
     }
     return out;
 }

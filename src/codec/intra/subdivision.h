@@ -10,6 +10,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -55,7 +56,6 @@ struct SubdivisionRule {
     std::uint32_t tangents = 8;
     bool operator==(const SubdivisionRule&) const = default;
 };
-inline constexpr std::uint32_t most_of_rule = 15;
 
 // Sixteen times what butterfly moves a new vertex off its edge's middle; exact.
 std::array<std::int64_t, 3> butterfly_offset(std::span<const LatticePoint> positions, const EdgeStencil& stencil);
@@ -63,13 +63,34 @@ std::array<std::int64_t, 3> butterfly_offset(std::span<const LatticePoint> posit
 Vector3d tangents_offset(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                          const EdgeStencil& stencil);
 // Where a new vertex is expected.
-Vector3d predicted_vertex(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
-                          const EdgeStencil& stencil, const SubdivisionRule& rule);
+Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
+                         const EdgeStencil& stencil, const SubdivisionRule& rule);
 
 // The triangles after the edges with a new vertex are split. vertex_of_edge: the number of each edge's new vertex, or
 // no_element. In the order of the triangles that they are cut from; of a triangle with two sides split, the remaining
 // quadrangle is cut from the first corner that is not between them.
 std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
                                       std::span<const std::uint32_t> vertex_of_edge);
+
+struct SubdivisionLevel {
+    std::uint32_t first = 0;             // the number of its first new vertex
+    std::vector<EdgeStencil> stencils;   // of each new vertex
+    // The new vertices before it on the other sides of the triangles beside its edge, or no_element.
+    std::vector<std::array<std::uint32_t, 4>> beside;
+    std::vector<Triangle> triangles;     // after it
+};
+
+struct SubdivisionDepth {
+    std::uint32_t levels = 3;  // how often edges are split, 0..most_levels
+    // An edge that is longer is split to make the last level, > 0, lattice units; one twice as long to make the last but
+    // one, and so on: levels come first where the base is coarse, and all triangles of the finest are about as large.
+    std::uint32_t longest_edge = 160;
+};
+inline constexpr std::uint32_t most_levels = 8;
+
+// All levels of a base mesh. They follow from the base alone, not from how its surface is moved: lengths are those on
+// the base's flat triangles. base: on the lattice, indices in range. Nothing if there would be more vertices than these.
+std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
+                                                       std::size_t most_vertices);
 
 }  // namespace htvm::internal

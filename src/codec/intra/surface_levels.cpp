@@ -27,12 +27,8 @@ std::size_t bend_class(double squared, std::uint32_t step) {
 
 std::uint32_t step_at(const SurfaceLevels& levels, std::uint32_t level) {
     std::uint32_t step = levels.step;
-    for (std::uint32_t k = levels.levels; k > level; --k) step = (step * levels.coarser + 8) / 16;
+    for (std::uint32_t k = levels.depth.levels; k > level; --k) step = (step * levels.coarser + 8) / 16;
     return std::max(step, 1u);
-}
-
-std::int64_t longest_edge_above(const SurfaceLevels& levels, std::uint32_t level) {
-    return std::int64_t{levels.longest_edge} << (levels.levels - level);
 }
 
 LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, std::int32_t value,
@@ -47,61 +43,48 @@ LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, 
     return {along(0), along(1), along(2)};
 }
 
-LevelsWalk::LevelsWalk(const LatticeMesh& base)
-    : positions(base.positions), triangles(base.triangles), values(base.positions.size(), 0) {}
-
-bool LevelsWalk::begin_level(const SurfaceLevels& levels, std::uint32_t level, std::size_t most_vertices) {
-    first = positions.size();
-    edges = find_edges(first, triangles);
-    const std::int64_t longest = longest_edge_above(levels, level);
-    split.clear();
-    vertex_of_edge.assign(edges.size(), no_element);
-    for (std::uint32_t e = 0; e < edges.size(); ++e) {
-        if (squared_distance(positions[edges.ends[e][0]], positions[edges.ends[e][1]]) <= longest * longest) continue;
-        vertex_of_edge[e] = static_cast<std::uint32_t>(first + split.size());
-        split.push_back(e);
-    }
-    if (split.size() > most_vertices - std::min(first, most_vertices)) return false;
-    stencils = edge_stencils(first, triangles, edges, split);
-    normals = vertex_normals(positions, triangles);
-    return true;
+ExpectedLevel expected_base(const LatticeMesh& base) {
+    ExpectedLevel out;
+    for (const auto p : base.positions) out.at.push_back(to_vector(p));
+    out.normal = vertex_normals(base.positions, base.triangles);
+    out.bent.assign(out.at.size(), 0);
+    return out;
 }
 
-void LevelsWalk::expect(const SubdivisionRule& rule) {
-    expected.clear();
-    normal.clear();
-    for (const auto& stencil : stencils) {
-        expected.push_back(predicted_vertex(positions, normals, stencil, rule));
-        normal.push_back(normalised(normals[stencil.a] + normals[stencil.b]));
+ExpectedLevel expected_level(const SubdivisionLevel& level, std::span<const LatticePoint> positions,
+                             std::span<const Triangle> triangles, const SubdivisionRule& rule) {
+    ExpectedLevel out;
+    out.above = vertex_normals(positions, triangles);
+    const auto& normals = out.above;
+    for (const auto& stencil : level.stencils) {
+        out.at.push_back(expected_vertex(positions, normals, stencil, rule));
+        out.normal.push_back(normalised(normals[stencil.a] + normals[stencil.b]));
+        const Vector3d off =
+            out.at.back() - (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
+        out.bent.push_back(dot(off, off));
     }
+    return out;
 }
 
-void LevelsWalk::end_level() { triangles = split_triangles(triangles, edges, vertex_of_edge); }
-
-DisplacementContext LevelsWalk::context_of(std::size_t i, std::uint32_t level, std::uint32_t step) const {
+DisplacementContext displacement_context(const SubdivisionLevel& level, std::size_t i, std::uint32_t number,
+                                         std::span<const std::int32_t> values, double bent, std::uint32_t step) {
     DisplacementContext out;
-    out.level = std::min<std::size_t>(level, DisplacementContext::levels - 1);
+    out.level = std::min<std::size_t>(number, DisplacementContext::levels - 1);
     const auto magnitude = [&](std::uint32_t v) {
         return static_cast<std::uint64_t>(std::min(std::abs(values[v]), 64));
     };
-    const auto& stencil = stencils[i];
+    const auto& stencil = level.stencils[i];
     std::uint64_t above = 2 * (magnitude(stencil.a) + magnitude(stencil.b));
     for (const auto v : stencil.across)
         if (v != no_element) above += magnitude(v);
     out.above = magnitude_class(above, DisplacementContext::aboves);
-    // Those of the level that come before it, in the triangles beside its edge.
     std::uint64_t sum = 0;
     std::int64_t signed_sum = 0, count = 0;
-    const auto own = split[i];
-    for (const auto t : edges.triangles[own]) {
-        if (t == no_element) continue;
-        for (const auto e : edges.of_triangle[t]) {
-            if (e >= own || vertex_of_edge[e] == no_element) continue;
-            const auto v = vertex_of_edge[e];
-            ++count;
-            sum += magnitude(v);
-            signed_sum += std::clamp(values[v], -64, 64);
-        }
+    for (const auto v : level.beside[i]) {
+        if (v == no_element) break;
+        ++count;
+        sum += magnitude(v);
+        signed_sum += std::clamp(values[v], -64, 64);
     }
     if (count > 0) {
         out.beside = 1 + magnitude_class(4 * sum / static_cast<std::uint64_t>(count), DisplacementContext::besides - 1);
@@ -109,8 +92,7 @@ DisplacementContext LevelsWalk::context_of(std::size_t i, std::uint32_t level, s
         const std::int64_t size = mean == 0 ? 0 : std::abs(mean) < 2 ? 1 : std::abs(mean) < 5 ? 2 : 3;
         out.trend = static_cast<std::size_t>(3 + (mean < 0 ? -size : size));
     }
-    const Vector3d off = expected[i] - (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
-    out.bend = bend_class(dot(off, off), step);
+    out.bend = bend_class(bent, step);
     return out;
 }
 
@@ -118,21 +100,24 @@ Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> run, 
                                              std::size_t most_vertices) {
     RangeDecoder decoder(run);
     ReadingCoder<RangeDecoder> coder{decoder};
-    auto levels = code_levels_header(coder, {});
-    if (levels.levels > most_levels) return fail(ErrorKind::corrupt_stream, "surface levels: too many levels");
-    LevelsWalk walk(base);
-    const auto nothing = [](auto&&...) { return 0; };
-    code_base_displacements(coder, walk, levels, nothing);
-    for (std::uint32_t k = 1; k <= levels.levels && !decoder.exhausted(); ++k) {
-        const auto rule = code_rule(coder, {});
-        if (!walk.begin_level(levels, k, most_vertices))
-            return fail(ErrorKind::limit, "surface levels: more vertices than may be decoded");
-        walk.expect(rule);
-        code_level_displacements(coder, walk, levels, k, nothing);
-        walk.end_level();
+    const auto levels = code_levels_header(coder, {});
+    auto subdivision = subdivide(base, levels.depth, most_vertices);
+    if (!subdivision) return fail(ErrorKind::limit, "surface levels: more vertices than may be decoded");
+    LeveledSurface out;
+    std::vector<std::int32_t> values;
+    DisplacementModels models;
+    const auto nothing = [](std::size_t, const DisplacementContext&) { return 0; };
+    code_displacements(coder, models, nullptr, 0, expected_base(base), step_at(levels, 0), out.positions, values,
+                       nothing);
+    out.triangles = base.triangles;
+    for (std::uint32_t k = 1; k <= levels.depth.levels && !decoder.exhausted(); ++k) {
+        auto& level = (*subdivision)[k - 1];
+        const auto expected = expected_level(level, out.positions, out.triangles, levels.rules[k - 1]);
+        code_displacements(coder, models, &level, k, expected, step_at(levels, k), out.positions, values, nothing);
+        out.triangles = std::move(level.triangles);
     }
     if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "surface levels: the run ends too early");
-    return LeveledSurface{std::move(walk.positions), std::move(walk.triangles)};
+    return out;
 }
 
 }  // namespace htvm::internal

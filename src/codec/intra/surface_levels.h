@@ -19,23 +19,17 @@
 
 namespace htvm::internal {
 
-inline constexpr std::uint32_t most_levels = 8;
 inline constexpr int displacement_bits = 4;  // of the fraction of displacements' steps
 
 struct SurfaceLevels {
-    std::uint32_t levels = 3;   // how often the base is subdivided, 0..most_levels
-    std::uint32_t step = 256;   // of the finest level's displacements, in sixteenths of lattice units, 1..2^20
+    SubdivisionDepth depth;
+    std::uint32_t step = 256;    // of the finest level's displacements, in sixteenths of lattice units, 1..2^20
     std::uint32_t coarser = 12;  // a level's step in sixteenths of that of the level below, 1..16
-    // An edge of the last level but one that is longer is split, lattice units, 1..2^24; twice as long one above, and
-    // so on: levels come first where the base is coarse, and all triangles of the finest are about as large.
-    std::uint32_t longest_edge = 160;
-    std::vector<SubdivisionRule> rules;  // one a level
+    std::array<SubdivisionRule, most_levels> rules{};  // of each level
 };
 
 // The step at a level, of 0 for the base to `levels`, in sixteenths of lattice units.
 std::uint32_t step_at(const SurfaceLevels& levels, std::uint32_t level);
-// The length from which on an edge is split to make a level, 1 to `levels`, lattice units.
-std::int64_t longest_edge_above(const SurfaceLevels& levels, std::uint32_t level);
 
 // Where a vertex comes to lie that is displaced along its normal.
 LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, std::int32_t value, std::uint32_t step);

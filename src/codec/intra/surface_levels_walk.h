@@ -92,72 +92,45 @@ std::int32_t code_displacement(Coder& coder, DisplacementModels& m, const Displa
 template <class Coder>
 SurfaceLevels code_levels_header(Coder& coder, const SurfaceLevels& wanted) {
     SurfaceLevels out;
-    out.levels = coder.raw(wanted.levels, 4);
+    out.depth.levels = std::min(coder.raw(wanted.depth.levels, 4), most_levels);
+    out.depth.longest_edge = coder.raw(wanted.depth.longest_edge - 1, 20) + 1;
     out.step = coder.raw(wanted.step - 1, 20) + 1;
     out.coarser = coder.raw(wanted.coarser - 1, 4) + 1;
-    out.longest_edge = coder.raw(wanted.longest_edge - 1, 20) + 1;
-    return out;
-}
-template <class Coder>
-SubdivisionRule code_rule(Coder& coder, const SubdivisionRule& wanted) {
-    SubdivisionRule out;
-    out.butterfly = coder.raw(wanted.butterfly, 4);
-    out.tangents = coder.raw(wanted.tangents, 4);
-    return out;
-}
-
-// Everything that is known of a surface while its levels are coded.
-struct LevelsWalk {
-    explicit LevelsWalk(const LatticeMesh& base);
-
-    std::vector<LatticePoint> positions;
-    std::vector<Triangle> triangles;
-    std::vector<std::int32_t> values;  // quantised displacement of each vertex; of the base's: zero, as they say nothing
-                                       // of what is below
-    // The level at hand. New vertices are numbered from `first` on in the order of their edges.
-    std::size_t first = 0;
-    MeshEdges edges;
-    std::vector<std::uint32_t> split;           // the edges that are split
-    std::vector<EdgeStencil> stencils;          // of each
-    std::vector<std::uint32_t> vertex_of_edge;  // or no_element
-    std::vector<Vector3d> normals;              // of the vertices above
-    std::vector<Vector3d> expected, normal;     // of each new vertex
-    DisplacementModels models;
-
-    // Finds what is split to make a level, 1 or more, from what is there. False, with nothing changed, if there would be
-    // more vertices than these.
-    bool begin_level(const SurfaceLevels& levels, std::uint32_t level, std::size_t most_vertices);
-    // Where the new vertices are expected by this rule.
-    void expect(const SubdivisionRule& rule);
-    // Cuts the triangles; all new vertices are in their places.
-    void end_level();
-
-    DisplacementContext context_of(std::size_t i, std::uint32_t level, std::uint32_t step) const;
-};
-
-// Codes how the base's vertices are moved. choose(vertex, normal, step, context) gives the value that is wanted;
-// decoding, anything.
-template <class Coder, class Choose>
-void code_base_displacements(Coder& coder, LevelsWalk& walk, const SurfaceLevels& levels, const Choose& choose) {
-    const auto normals = vertex_normals(walk.positions, walk.triangles);
-    const auto step = step_at(levels, 0);
-    for (std::size_t v = 0; v < walk.positions.size(); ++v) {
-        const DisplacementContext context;
-        const auto value = code_displacement(coder, walk.models, context, choose(v, normals[v], step, context));
-        walk.positions[v] = displaced_vertex(to_vector(walk.positions[v]), normals[v], value, step);
+    for (std::uint32_t k = 0; k < out.depth.levels; ++k) {
+        out.rules[k].butterfly = coder.raw(wanted.rules[k].butterfly, 4);
+        out.rules[k].tangents = coder.raw(wanted.rules[k].tangents, 4);
     }
+    return out;
 }
 
-// Codes the displacements of the level at hand, which has begun and is expected.
+// The vertices of a level before they are moved. Of the base, where it has them.
+struct ExpectedLevel {
+    std::vector<Vector3d> at, normal;
+    std::vector<double> bent;  // squared, how far off the middle of its edge each is expected; 0 for the base
+    std::vector<Vector3d> above;  // the normals of all vertices of the levels above
+};
+ExpectedLevel expected_base(const LatticeMesh& base);
+// positions: of the levels above. triangles: of the level above.
+ExpectedLevel expected_level(const SubdivisionLevel& level, std::span<const LatticePoint> positions,
+                             std::span<const Triangle> triangles, const SubdivisionRule& rule);
+
+// The context of vertex i of a level. values: quantised displacements of the vertices before it; those of the base
+// count as zero, since what a coarse base leaves says nothing of what is below.
+DisplacementContext displacement_context(const SubdivisionLevel& level, std::size_t i, std::uint32_t number,
+                                         std::span<const std::int32_t> values, double bent, std::uint32_t step);
+
+// Codes the displacements of a level, whose number is 0 for the base, and moves its vertices. The vectors end where it
+// begins. level: null for the base. choose(i, context) gives the value that is wanted; decoding, anything.
 template <class Coder, class Choose>
-void code_level_displacements(Coder& coder, LevelsWalk& walk, const SurfaceLevels& levels, std::uint32_t level,
-                              const Choose& choose) {
-    const auto step = step_at(levels, level);
-    for (std::size_t i = 0; i < walk.split.size(); ++i) {
-        const auto context = walk.context_of(i, level, step);
-        const auto value = code_displacement(coder, walk.models, context, choose(i, step, context));
-        walk.values.push_back(value);
-        walk.positions.push_back(displaced_vertex(walk.expected[i], walk.normal[i], value, step));
+void code_displacements(Coder& coder, DisplacementModels& models, const SubdivisionLevel* level, std::uint32_t number,
+                        const ExpectedLevel& expected, std::uint32_t step, std::vector<LatticePoint>& positions,
+                        std::vector<std::int32_t>& values, const Choose& choose) {
+    for (std::size_t i = 0; i < expected.at.size(); ++i) {
+        const auto context =
+            level ? displacement_context(*level, i, number, values, expected.bent[i], step) : DisplacementContext{};
+        const auto value = code_displacement(coder, models, context, choose(i, context));
+        values.push_back(level ? value : 0);
+        positions.push_back(displaced_vertex(expected.at[i], expected.normal[i], value, step));
     }
 }
 
