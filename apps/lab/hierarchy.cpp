@@ -38,10 +38,10 @@ struct Options {
     std::vector<double> edges{10};        // mm
     std::uint32_t levels = 3, coarser = 12;
     double lambda = 0.12, least_moved = 0.7;
-    int rounds = 5, sweeps = 6;
-    double back = 1, farthest = 0.4, last_reach = 6;
-    float agreement = 0.3F;
-    std::uint32_t butterfly = 0, tangents = 8;
+    int rounds = 5, choices = 3, iterations = 6;
+    double back = 1, farthest = 0.2, last_reach = 6;
+    float agreement = 0.6F;
+    std::uint32_t butterfly = 0, tangents = 10;
     bool json = false;
 };
 
@@ -203,7 +203,8 @@ Result<void> run_hierarchy(const Options& options) {
                         chosen.fit.farthest = options.farthest;
                         chosen.fit.agreement = options.agreement;
                         chosen.fit.back = options.back;
-                        chosen.fit.sweeps = options.sweeps;
+                        chosen.fit.choices = options.choices;
+                        chosen.fit.iterations = options.iterations;
                         auto point = levels_point(mesh, lattice, base, captured, base_step, chosen);
                         if (!point) return tl::unexpected(point.error());
                         point->setting = fmt::format("base {:g}/{:g} edge {:g} step {:g}", error, base_step, finest, step);
@@ -236,7 +237,8 @@ void add_hierarchy(CLI::App& app, app::Run& run) {
     command->add_option("--rounds", options->rounds, "");
     command->add_option("--least-moved", options->least_moved, "");
     command->add_option("--back", options->back, "");
-    command->add_option("--sweeps", options->sweeps, "");
+    command->add_option("--choices", options->choices, "");
+    command->add_option("--iterations", options->iterations, "");
     command->add_option("--farthest", options->farthest, "");
     command->add_option("--last-reach", options->last_reach, "");
     command->add_option("--agreement", options->agreement, "");

@@ -164,11 +164,12 @@ std::vector<Vector3d> SurfaceFit::moved_by(std::span<const double> change) const
     return out;
 }
 
-// How much the squared distance shrinks with each displacement, halved.
-std::vector<double> SurfaceFit::gradient(std::span<const Vector3d> moved) const {
+// How much half the squared distance shrinks with each displacement, where vertices have moved so far; residuals: false
+// for what the move alone makes of it.
+std::vector<double> SurfaceFit::gradient(std::span<const Vector3d> moved, bool residuals) const {
     std::vector<Vector3d> pull(moved.size(), Vector3d{});
     for (const auto& s : samples_) {
-        double residual = s.residual;
+        double residual = residuals ? s.residual : 0;
         for (std::size_t i = 0; i < 3; ++i)
             residual -= static_cast<double>(s.shares[i]) * dot(moved[s.corners[i]], s.normal);
         const Vector3d force = s.normal * (residual * s.weight);
@@ -211,15 +212,66 @@ std::vector<double> SurfaceFit::gradient(std::span<const Vector3d> moved) const 
     return out;
 }
 
-void SurfaceFit::sweep(std::size_t level) {
-    const auto wanted = gradient(moved_by(change_));
+// What a displacement must at least be to be worth its bits.
+double SurfaceFit::least(std::size_t v) const {
+    if (v < base_.positions.size()) return 0;
     const double step = static_cast<double>(levels_.step) / (1 << displacement_bits);
-    for (std::size_t v = begin_of(level); v < end_of(level); ++v) {
+    return options_.least_moved * step * std::sqrt(finest_mass_ / mass_[v]);
+}
+
+// Finds the changes of those that are free that fit best, by conjugate gradients.
+void SurfaceFit::solve(std::span<const std::uint8_t> is_free) {
+    const auto restricted = [&](std::vector<double> x) {
+        for (std::size_t v = 0; v < x.size(); ++v)
+            if (is_free[v] == 0) x[v] = 0;
+        return x;
+    };
+    const auto preconditioned = [&](std::span<const double> x) {
+        std::vector<double> out(x.size(), 0);
+        for (std::size_t v = 0; v < x.size(); ++v)
+            if (is_free[v] != 0) out[v] = x[v] / mass_[v];
+        return out;
+    };
+    const auto product = [](std::span<const double> x, std::span<const double> y) {
+        double sum = 0;
+        for (std::size_t v = 0; v < x.size(); ++v) sum += x[v] * y[v];
+        return sum;
+    };
+    auto rest = restricted(gradient(moved_by(change_), true));
+    auto along = preconditioned(rest);
+    double before = product(rest, along);
+    for (int i = 0; i < options_.iterations && before > 0; ++i) {
+        auto bent = restricted(gradient(moved_by(along), false));
+        const double curvature = -product(along, bent);
+        if (!(curvature > 0)) break;
+        const double far = before / curvature;
+        for (std::size_t v = 0; v < change_.size(); ++v) {
+            change_[v] += far * along[v];
+            rest[v] += far * bent[v];
+        }
+        const auto next = preconditioned(rest);
+        const double now = product(rest, next);
+        for (std::size_t v = 0; v < along.size(); ++v) along[v] = next[v] + now / before * along[v];
+        before = now;
+    }
+}
+
+// Fits the displacements from a vertex on, with as few as are worth it: those that are not zero, and those that would
+// be large enough by themselves, are fitted together, and then the small ones of them taken out.
+void SurfaceFit::choose_and_solve(std::size_t first) {
+    std::vector<std::uint8_t> is_free(displacements_.size(), 0);
+    const auto wanted = gradient(moved_by(change_), true);
+    for (std::size_t v = first; v < is_free.size(); ++v) {
         if (!(mass_[v] > 0)) continue;
-        const double before = displacements_[v] + change_[v];
-        double now = before + wanted[v] / mass_[v];
-        if (level > 0 && std::abs(now) < options_.least_moved * step * std::sqrt(finest_mass_ / mass_[v])) now = 0;
-        if (level > 0) now = std::clamp(now, -farthest_[v], farthest_[v]);
+        const double now = displacements_[v] + change_[v];
+        is_free[v] = now != 0 || v < base_.positions.size() || std::abs(now + wanted[v] / mass_[v]) >= least(v);
+    }
+    solve(is_free);
+    for (std::size_t v = first; v < is_free.size(); ++v) {
+        if (is_free[v] == 0) continue;
+        double now = displacements_[v] + change_[v];
+        if (std::abs(now) < least(v)) now = 0;
+        if (v >= base_.positions.size()) now = std::clamp(now, -farthest_[v], farthest_[v]);
         change_[v] = now - displacements_[v];
     }
 }
@@ -230,8 +282,7 @@ void SurfaceFit::improve(std::size_t first, int rounds) {
         reach_ = static_cast<float>(std::max(options_.reach.value / (1 << std::min(rounds_++, 8)), options_.last_reach.value));
         find_samples();
         std::fill(change_.begin(), change_.end(), 0);
-        for (int i = 0; i < options_.sweeps; ++i)
-            for (std::size_t k = first; k <= subdivision_.size(); ++k) sweep(k);
+        for (int i = 0; i < options_.choices; ++i) choose_and_solve(begin_of(first));
         for (std::size_t v = 0; v < displacements_.size(); ++v) displacements_[v] += change_[v];
     }
 }

@@ -22,7 +22,7 @@ struct SurfaceFitOptions {
     double farthest = 0.4;
     double least_moved = 0.7;  // a displacement that spares less than one of so many steps of the finest level is none
     double back = 1;  // weight of the shown surface's vertices beside that of the captured surface
-    int sweeps = 6;
+    int choices = 3, iterations = 6;
     Threads threads = {};
 };
 
@@ -53,8 +53,10 @@ private:
     void find_samples_back(std::span<const Triangle> triangles);
     void weigh();
     std::vector<Vector3d> moved_by(std::span<const double> change) const;
-    std::vector<double> gradient(std::span<const Vector3d> moved) const;
-    void sweep(std::size_t level);
+    std::vector<double> gradient(std::span<const Vector3d> moved, bool residuals) const;
+    double least(std::size_t v) const;
+    void solve(std::span<const std::uint8_t> is_free);
+    void choose_and_solve(std::size_t first);
     std::size_t begin_of(std::size_t level) const;
     std::size_t end_of(std::size_t level) const;
 
