@@ -127,6 +127,22 @@ Result<Point> levels_point(const Mesh& mesh, const Lattice& lattice, const Latti
         }
         out.detail += fmt::format(" [>2mm {:.2f} ({:.4f} of v) >4mm {:.2f}]", two / all, static_cast<double>(n2) / static_cast<double>(captured.positions.size()), four / all);
     }
+    {
+        double all = 0, two = 0, four = 0;
+        std::size_t n2 = 0;
+        for (std::size_t v = 0; v < shown.positions.size(); ++v) {
+            const double d = captured.closest(point_of(shown.positions[v])).squared_distance / 256.0;
+            all += d;
+            if (d > 4) two += d, ++n2;
+            if (d > 16) four += d;
+            if (d > 16 && std::getenv("WHERE")) {
+                std::size_t level = 0, end = 0;
+                for (; level < coded.parts.size(); ++level) if (v < (end += coded.parts[level].vertices)) break;
+                fmt::print("v {} level {} at {} {} {} off {:.1f}\n", v, level, shown.positions[v].x/16, shown.positions[v].y/16, shown.positions[v].z/16, std::sqrt(d));
+            }
+        }
+        out.detail += fmt::format(" back[>2mm {:.2f} ({}) >4mm {:.2f}]", two / all, n2, four / all);
+    }
     for (const auto& part : coded.parts)
         out.detail += fmt::format(" {}/{}:{:.0f}", part.moved, part.vertices, part.bytes);
     return out;
@@ -182,9 +198,7 @@ Result<void> run_hierarchy(const Options& options) {
         const auto whole = to_lattice(mesh, lattice);
         if (!whole) return tl::unexpected(whole.error());
         const auto surface_mesh = welded(*whole, at_same_place(*whole));
-        const double edge = mean_edge(surface_mesh.positions, surface_mesh.triangles, 8);
-        const SurfaceIndex captured(points_of(surface_mesh.positions), surface_mesh.triangles,
-                                    {.cell = static_cast<float>(2 * edge)});
+        const auto captured = evenly_sampled(surface_mesh, {});
         for (const double error : options.base_errors) {
             const auto base = base_mesh(surface_mesh, 16 * error);
             for (const double base_step : options.base_steps)

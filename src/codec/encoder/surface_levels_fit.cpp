@@ -5,6 +5,21 @@
 
 namespace htvm::internal {
 
+SurfaceIndex evenly_sampled(const LatticeMesh& captured, Threads threads) {
+    constexpr std::size_t most_vertices = std::size_t{1} << 22;
+    const double edge = mean_edge(captured.positions, captured.triangles, 8);
+    const SubdivisionDepth depth{.levels = 5, .longest_edge = static_cast<std::uint32_t>(std::max(1.0, 2 * edge))};
+    auto points = points_of(captured.positions);
+    const auto levels = subdivide(captured, depth, most_vertices);
+    const bool even = levels && !levels->empty();
+    if (even)
+        for (const auto& level : *levels)
+            for (const auto& s : level.stencils)
+                points.push_back(to_floats((to_vector(points[s.a]) + to_vector(points[s.b])) * 0.5));
+    return {points, even ? levels->back().triangles : captured.triangles,
+            {.cell = static_cast<float>(2 * edge), .threads = threads}};
+}
+
 SurfaceFit::SurfaceFit(const SurfaceIndex& captured, const LatticeMesh& base,
                        std::span<const SubdivisionLevel> subdivision, const SurfaceLevels& levels,
                        const SurfaceFitOptions& options)

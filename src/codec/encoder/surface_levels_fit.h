@@ -26,6 +26,10 @@ struct SurfaceFitOptions {
     Threads threads = {};
 };
 
+// The captured surface as it is searched and sampled here: long triangles, as those of a sole, are cut into smaller ones
+// that lie in them, since searches by direction go by vertices.
+SurfaceIndex evenly_sampled(const LatticeMesh& captured, Threads threads);
+
 class SurfaceFit {
 public:
     // All that is passed must outlive the fit. levels.rules are set.
