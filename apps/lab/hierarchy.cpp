@@ -39,7 +39,9 @@ struct Options {
     std::uint32_t levels = 3, coarser = 12;
     double lambda = 0.12, least_moved = 0.7;
     int rounds = 5, choices = 3, iterations = 6;
-    double back = 1, farthest = 0.2, last_reach = 6;
+    int refined = 1;
+    double outlier = 3;
+    double back = 1, farthest = 0.5, last_reach = 6;
     float agreement = 0.6F;
     std::uint32_t butterfly = 0, tangents = 10;
     bool json = false;
@@ -74,11 +76,12 @@ Result<Point> intra_point(const Mesh& mesh, double quality) {
     return out;
 }
 
-LatticeMesh base_mesh(const LatticeMesh& welded_mesh, double error) {
+LatticeMesh base_mesh(const LatticeMesh& welded_mesh, double error, std::span<const float> finer) {
     std::vector<Eigen::Vector3d> points;
     for (const auto p : welded_mesh.positions) points.emplace_back(p.x, p.y, p.z);
     SimplificationOptions options;
     options.surface_error = error;
+    options.finer = finer;
     const auto simplified = simplify(points, welded_mesh.triangles, {}, options);
     LatticeMesh out;
     for (const auto& p : simplified.positions)
@@ -124,6 +127,7 @@ Result<Point> levels_point(const Mesh& mesh, const Lattice& lattice, const Latti
             all += d;
             if (d > 4) two += d, ++n2;
             if (d > 16) four += d;
+            if (d > 9 && std::getenv("WHERE")) fmt::print("F {} {} {} {:.1f}\n", p[0]/16, p[1]/16, p[2]/16, std::sqrt(d));
         }
         out.detail += fmt::format(" [>2mm {:.2f} ({:.4f} of v) >4mm {:.2f}]", two / all, static_cast<double>(n2) / static_cast<double>(captured.positions.size()), four / all);
     }
@@ -200,7 +204,39 @@ Result<void> run_hierarchy(const Options& options) {
         const auto surface_mesh = welded(*whole, at_same_place(*whole));
         const auto captured = evenly_sampled(surface_mesh, {});
         for (const double error : options.base_errors) {
-            const auto base = base_mesh(surface_mesh, 16 * error);
+            auto base = base_mesh(surface_mesh, 16 * error, {});
+            std::vector<float> finer(surface_mesh.positions.size(), 1);
+            for (int again = 0; again < options.refined; ++again) {
+                SurfaceLevels fitted;
+                fitted.depth = {options.levels, static_cast<std::uint32_t>(std::lround(16 * options.edges.front()))};
+                fitted.step = static_cast<std::uint32_t>(std::lround(256 * options.steps.front()));
+                fitted.rules.fill({options.butterfly, options.tangents});
+                const auto subdivision = subdivide(base, fitted.depth, std::size_t{1} << 24);
+                SurfaceFitOptions fit_options;
+                SurfaceFit fit(captured, base, *subdivision, fitted, fit_options);
+                fit.improve(0, 4);
+                const auto shown = fit.surface();
+                const SurfaceIndex index(points_of(shown), subdivision->back().triangles);
+                std::vector<double> distance;
+                double sum = 0;
+                for (const auto& p : surface_mesh.positions) {
+                    distance.push_back(index.closest(point_of(p)).squared_distance);
+                    sum += distance.back();
+                }
+                const double usual = options.outlier * std::sqrt(sum / static_cast<double>(distance.size()));
+                const auto around = vertices_around(surface_mesh.positions.size(), surface_mesh.triangles);
+                std::vector<float> own;
+                for (const double d : distance)
+                    own.push_back(static_cast<float>(std::clamp(std::sqrt(d) / usual, 1.0, 3.0)));
+                for (int ring = 0; ring < 2; ++ring) {
+                    auto wider = own;
+                    for (std::size_t v = 0; v < own.size(); ++v)
+                        for (const auto other : around.of(v)) wider[v] = std::max(wider[v], own[other]);
+                    own = std::move(wider);
+                }
+                for (std::size_t v = 0; v < own.size(); ++v) finer[v] *= own[v];
+                base = base_mesh(surface_mesh, 16 * error, finer);
+            }
             for (const double base_step : options.base_steps)
                 for (const double finest : options.edges)
                     for (const double step : options.steps) {
@@ -256,6 +292,8 @@ void add_hierarchy(CLI::App& app, app::Run& run) {
     command->add_option("--farthest", options->farthest, "");
     command->add_option("--last-reach", options->last_reach, "");
     command->add_option("--agreement", options->agreement, "");
+    command->add_option("--refined", options->refined, "");
+    command->add_option("--outlier", options->outlier, "");
     command->add_option("--lambda", options->lambda, "");
     command->add_option("--butterfly", options->butterfly, "");
     command->add_option("--tangents", options->tangents, "");

@@ -18,8 +18,8 @@ namespace htvm::internal {
 struct SurfaceFitOptions {
     LatticeUnits reach{480};  // how far the surfaces may be apart at first
     LatticeUnits last_reach{96};  // and in the end
-    float agreement = 0.3F;
-    double farthest = 0.4;
+    float agreement = 0.6F;
+    double farthest = 0.5;
     double least_moved = 0.7;  // a displacement that spares less than one of so many steps of the finest level is none
     double back = 1;  // weight of the shown surface's vertices beside that of the captured surface
     int choices = 3, iterations = 6;
@@ -41,6 +41,8 @@ public:
     // Says what a vertex's displacement is, in lattice units: the next improve() begins below it.
     void set(std::size_t vertex, double displacement) { displacements_[vertex] = displacement; }
 
+    // The finest level's vertices with the displacements as they are.
+    std::span<const LatticePoint> surface() { return rebuild(), positions_; }
     std::span<const double> displacements() const { return displacements_; }  // of all vertices, lattice units
     // What a squared lattice unit of error of each displacement costs, in those of one vertex of the finest level.
     std::span<const double> weights() const { return weights_; }
