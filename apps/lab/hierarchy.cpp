@@ -33,11 +33,11 @@ struct Options {
     std::vector<std::size_t> frames{0};
     std::vector<double> qualities{20, 30, 40, 50, 60, 70, 80, 90, 100};
     std::vector<double> base_errors{3};   // mm
-    std::vector<double> base_steps{4};    // mm
+    std::vector<double> base_steps{6};    // mm
     std::vector<double> steps{1};         // mm
     std::vector<double> edges{10};        // mm
     std::uint32_t levels = 3, coarser = 12;
-    double lambda = 0.12, least_moved = 0.7;
+    double lambda = 0.06, least_moved = 0.7;
     int rounds = 5, choices = 3, iterations = 6;
     int refined = 1;
     double outlier = 3;
