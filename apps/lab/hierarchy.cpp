@@ -1,4 +1,4 @@
-// htvm-lab hierarchy: what I-frames take beside a base mesh with levels of displacements, at equal error.
+// htvm-lab hierarchy: what an I-frame takes beside a base mesh with levels of displacements, at equal error.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -9,18 +9,15 @@
 #include <string>
 #include <vector>
 
-#include "codec/encoder/surface_levels.h"
-#include "codec/encoder/tracked/captured_surface.h"
+#include "codec/encoder/leveled_intra.h"
 #include "codec/format/sequence.h"
-#include "codec/intra/intra_frame.h"
+#include "coders.h"
 #include "command_line/capture.h"
 #include "command_line/terminal.h"
 #include "commands.h"
-#include "coders.h"
 #include "core/lattice.h"
 #include "htvm/encoder.hpp"
 #include "metrics/surface_error.h"
-#include "surface/simplification.h"
 
 namespace htvm::lab {
 
@@ -30,243 +27,180 @@ namespace {
 
 struct Options {
     CaptureOptions capture;
-    std::vector<std::size_t> frames{0};
+    std::vector<std::size_t> at{0};
     std::vector<double> qualities{20, 30, 40, 50, 60, 70, 80, 90, 100};
-    std::vector<double> base_errors{3};   // mm
-    std::vector<double> base_steps{6};    // mm
-    std::vector<double> steps{1};         // mm
-    std::vector<double> edges{10};        // mm
-    std::uint32_t levels = 3, coarser = 12;
-    double lambda = 0.06, least_moved = 0.7;
-    int rounds = 5, choices = 3, iterations = 6;
-    int refined = 1;
-    double outlier = 3;
-    double back = 1, farthest = 0.5, last_reach = 6;
-    float agreement = 0.6F;
-    std::uint32_t butterfly = 0, tangents = 10;
+    std::vector<double> steps{1, 1.4, 1.9, 2.6, 3.5, 4.7};  // mm
+    std::vector<double> errors{0.4, 0.8};                   // mm
+    std::uint64_t samples = 200000;
+    LeveledIntraOptions levels;
     bool json = false;
 };
 
+// One way to code a frame, and what it takes and leaves.
 struct Point {
     std::string setting;
     std::size_t bytes = 0, vertices = 0;
-    double m2 = 0, forward = 0, backward = 0;
-    std::string detail;
+    SurfaceError error;
+    // Of a base with levels:
+    std::size_t base_vertices = 0, connectivity = 0, base_positions = 0;
+    std::vector<EncodedSurfaceLevels::Part> parts = {};
 };
 
-constexpr std::uint64_t samples = 200000;
+Result<Point> measured(Point point, const Mesh& captured, const Mesh& shown, const Options& options) {
+    SurfaceErrorOptions how;
+    how.samples = options.samples;
+    auto error = surface_error(captured, shown, how);
+    if (!error) return tl::unexpected(error.error());
+    point.error = *error;
+    return point;
+}
 
-Result<Point> intra_point(const Mesh& mesh, double quality) {
-    EncoderOptions options = default_options(Profile::tracked);
-    options.tracked.denoise = Denoising::off;
-    options.geometry_step = quality_point(quality).geometry_step;
-    auto encoder = Encoder::create(options);
+// As htvm encode makes an I-frame, noise and all.
+Result<Point> intra_point(const Mesh& mesh, double quality, const Options& options) {
+    EncoderOptions settings = default_options(Profile::tracked);
+    settings.tracked.denoise = Denoising::off;
+    settings.geometry_step = quality_point(quality).geometry_step;
+    auto encoder = Encoder::create(settings);
     if (!encoder) return tl::unexpected(encoder.error());
     if (auto ok = encoder->push(mesh, nullptr, 0, true); !ok) return tl::unexpected(ok.error());
     if (auto ok = encoder->finish(); !ok) return tl::unexpected(ok.error());
     Point out;
-    out.setting = fmt::format("q{:g}", quality);
+    out.setting = fmt::format("-q {:g}", quality);
     out.bytes = encoder->last_frame().bytes.total();
     out.vertices = encoder->last_frame().vertices;
-    const auto error = surface_error(mesh, encoder->reconstruction(), {.samples = samples});
-    if (!error) return tl::unexpected(error.error());
-    out.forward = error->forward.rms;
-    out.backward = error->backward.rms;
-    out.m2 = m2(*error);
-    return out;
+    return measured(std::move(out), mesh, encoder->reconstruction(), options);
 }
 
-LatticeMesh base_mesh(const LatticeMesh& welded_mesh, double error, std::span<const float> finer) {
-    std::vector<Eigen::Vector3d> points;
-    for (const auto p : welded_mesh.positions) points.emplace_back(p.x, p.y, p.z);
-    SimplificationOptions options;
-    options.surface_error = error;
-    options.finer = finer;
-    const auto simplified = simplify(points, welded_mesh.triangles, {}, options);
-    LatticeMesh out;
-    for (const auto& p : simplified.positions)
-        out.positions.push_back({within_lattice(std::llround(p.x())), within_lattice(std::llround(p.y())),
-                                 within_lattice(std::llround(p.z()))});
-    out.triangles = simplified.triangles;
-    return out;
-}
-
-Result<Point> levels_point(const Mesh& mesh, const Lattice& lattice, const LatticeMesh& base,
-                           const SurfaceIndex& captured, double base_step, const SurfaceLevelsOptions& options) {
-    FramePayload payload;
-    IntraFrameOptions intra;
-    intra.geometry_step = std::max(1, static_cast<std::int32_t>(std::lround(base_step * 16)));
-    intra.merge_duplicates = false;
-    const auto decoded = encode_intra_frame(base, intra, payload);
-    if (!decoded) return tl::unexpected(decoded.error());
-    const auto coded = encode_surface_levels(captured, *decoded, options);
-    const auto again = decode_surface_levels(coded.run, *decoded, std::size_t{1} << 24);
+Result<Point> leveled_point(const Mesh& mesh, double step, const Options& options) {
+    Lattice lattice;
+    const auto origin = lattice_origin(mesh);
+    if (!origin) return tl::unexpected(origin.error());
+    lattice.origin = *origin;
+    const auto captured = to_lattice(mesh, lattice);
+    if (!captured) return tl::unexpected(captured.error());
+    auto settings = options.levels;
+    settings.step = LatticeUnits(step / lattice.step());
+    const auto coded = encode_leveled_intra(*captured, settings);
+    if (!coded) return tl::unexpected(coded.error());
+    const auto& levels = coded->levels;
+    const auto again = decode_surface_levels(levels.run, coded->decoded_base, levels.surface.positions.size());
     if (!again) return tl::unexpected(again.error());
-    if (again->positions != coded.surface.positions || again->triangles != coded.surface.triangles)
-        return fail(ErrorKind::corrupt_stream, "what was decoded is not what was encoded");
+    if (again->positions != levels.surface.positions || again->triangles != levels.surface.triangles)
+        return fail(ErrorKind::corrupt_stream, "what is decoded is not what was encoded");
+    constexpr std::size_t layer_overhead = 3;  // the layer's number and length
     Point out;
-    const std::size_t base_bytes = write_frame_payload(payload).size();
-    out.bytes = base_bytes + coded.run.size() + 2 + packet_overhead;
-    out.vertices = coded.surface.positions.size();
+    out.setting = fmt::format("step {:g}", step);
+    out.bytes = write_frame_payload(coded->base).size() + layer_overhead + levels.run.size() + packet_overhead;
+    out.vertices = levels.surface.positions.size();
+    out.base_vertices = coded->decoded_base.positions.size();
+    out.connectivity = coded->base.of(Layer::fans).size();
+    out.base_positions = coded->base.of(Layer::geometry).size();
+    out.parts = levels.parts;
     LatticeMesh shown;
-    shown.positions = coded.surface.positions;
-    shown.triangles = coded.surface.triangles;
-    const auto error = surface_error(mesh, to_mesh(shown, lattice), {.samples = samples});
-    if (!error) return tl::unexpected(error.error());
-    out.forward = error->forward.rms;
-    out.backward = error->backward.rms;
-    out.m2 = m2(*error);
-    out.detail = fmt::format("base {} v, fans {} geo {};", decoded->positions.size(), payload.of(Layer::fans).size(),
-                             payload.of(Layer::geometry).size());
-    {
-        const SurfaceIndex decoded_index(points_of(shown.positions), shown.triangles);
-        double all = 0, two = 0, four = 0;
-        std::size_t n2 = 0;
-        for (const auto& p : captured.positions) {
-            const double d = decoded_index.closest(p).squared_distance / 256.0;
-            all += d;
-            if (d > 4) two += d, ++n2;
-            if (d > 16) four += d;
-            if (d > 9 && std::getenv("WHERE")) fmt::print("F {} {} {} {:.1f}\n", p[0]/16, p[1]/16, p[2]/16, std::sqrt(d));
-        }
-        out.detail += fmt::format(" [>2mm {:.2f} ({:.4f} of v) >4mm {:.2f}]", two / all, static_cast<double>(n2) / static_cast<double>(captured.positions.size()), four / all);
-    }
-    {
-        double all = 0, two = 0, four = 0;
-        std::size_t n2 = 0;
-        for (std::size_t v = 0; v < shown.positions.size(); ++v) {
-            const double d = captured.closest(point_of(shown.positions[v])).squared_distance / 256.0;
-            all += d;
-            if (d > 4) two += d, ++n2;
-            if (d > 16) four += d;
-            if (d > 16 && std::getenv("WHERE")) {
-                std::size_t level = 0, end = 0;
-                for (; level < coded.parts.size(); ++level) if (v < (end += coded.parts[level].vertices)) break;
-                fmt::print("v {} level {} at {} {} {} off {:.1f}\n", v, level, shown.positions[v].x/16, shown.positions[v].y/16, shown.positions[v].z/16, std::sqrt(d));
-            }
-        }
-        out.detail += fmt::format(" back[>2mm {:.2f} ({}) >4mm {:.2f}]", two / all, n2, four / all);
-    }
-    for (const auto& part : coded.parts)
-        out.detail += fmt::format(" {}/{}:{:.0f}", part.moved, part.vertices, part.bytes);
-    return out;
+    shown.positions = levels.surface.positions;
+    shown.triangles = levels.surface.triangles;
+    return measured(std::move(out), mesh, to_mesh(shown, lattice), options);
 }
 
-double bytes_at(std::vector<Point> points, double m2) {
-    // The lower hull in (log m2, log bytes).
-    std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.m2 < b.m2; });
-    double best = 0;
-    for (std::size_t i = 0; i < points.size(); ++i)
-        for (std::size_t j = i + 1; j < points.size(); ++j) {
-            if (!(points[i].m2 <= m2 && m2 <= points[j].m2)) continue;
-            const double x0 = std::log(points[i].m2), x1 = std::log(points[j].m2);
-            const double y0 = std::log(static_cast<double>(points[i].bytes)),
-                         y1 = std::log(static_cast<double>(points[j].bytes));
-            const double t = x1 > x0 ? (std::log(m2) - x0) / (x1 - x0) : 0;
-            const double bytes = std::exp(y0 + t * (y1 - y0));
-            if (best == 0 || bytes < best) best = bytes;
-        }
-    return best;
+// The bytes at which an error is reached, between neighbouring points on logarithmic scales; 0 where none is that good
+// or that bad.
+double bytes_at(std::vector<Point> points, double error) {
+    std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return m2(a.error) < m2(b.error); });
+    for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+        const double below = m2(points[i].error), above = m2(points[i + 1].error);
+        if (!(below <= error && error <= above)) continue;
+        const double share = above > below ? std::log(error / below) / std::log(above / below) : 0;
+        return std::exp(std::log(static_cast<double>(points[i].bytes)) * (1 - share) +
+                        std::log(static_cast<double>(points[i + 1].bytes)) * share);
+    }
+    return 0;
+}
+
+nlohmann::json json_of(const Point& p) {
+    nlohmann::json out = {{"setting", p.setting},
+                          {"bytes", p.bytes},
+                          {"vertices", p.vertices},
+                          {"m2_mm", m2(p.error)},
+                          {"forward_mm", p.error.forward.rms},
+                          {"backward_mm", p.error.backward.rms}};
+    if (p.parts.empty()) return out;
+    out["base_vertices"] = p.base_vertices;
+    out["connectivity_bytes"] = p.connectivity;
+    out["base_position_bytes"] = p.base_positions;
+    for (const auto& part : p.parts)
+        out["levels"].push_back({{"vertices", part.vertices}, {"moved", part.moved}, {"bytes", part.bytes}});
+    return out;
 }
 
 void print(const Point& p) {
-    fmt::print("{:34} {:>7} B {:>7} v  M2 {:.3f} ({:.3f} {:.3f})  {}\n", p.setting, p.bytes, p.vertices, p.m2,
-               p.forward, p.backward, p.detail);
+    fmt::print("{:12}{:>8}{:>9}{:>8.3f}{:>9.3f}{:>9.3f}", p.setting, p.bytes, p.vertices, m2(p.error),
+               p.error.forward.rms, p.error.backward.rms);
+    if (!p.parts.empty()) fmt::print("{:>8}{:>7}{:>7}", p.base_vertices, p.connectivity, p.base_positions);
+    for (const auto& part : p.parts)
+        fmt::print("{:>7} {:<6}", part.bytes,
+                   fmt::format("({:.0f}%)", 100 * static_cast<double>(part.moved) /
+                                                static_cast<double>(std::max<std::size_t>(part.vertices, 1))));
+    fmt::print("\n");
     std::fflush(stdout);
+}
+
+Result<nlohmann::json> measure_frame(Mesh mesh, std::size_t number, const Options& options) {
+    mesh.colours.clear();
+    mesh.normals.clear();
+    mesh.texcoords.clear();
+    if (!options.json)
+        fmt::print("\nframe {}\n\n{:12}{:>8}{:>9}{:>8}{:>9}{:>9}{:>8}{:>7}{:>7}  displacements (share that moves)\n",
+                   number, "", "bytes", "vertices", "M2, mm", "forward", "backward", "base", "fans", "places");
+    std::vector<Point> today, leveled;
+    for (const double quality : options.qualities) {
+        auto point = intra_point(mesh, quality, options);
+        if (!point) return tl::unexpected(point.error());
+        if (!options.json) print(*point);
+        today.push_back(std::move(*point));
+    }
+    for (const double step : options.steps) {
+        auto point = leveled_point(mesh, step, options);
+        if (!point) return tl::unexpected(point.error());
+        if (!options.json) print(*point);
+        leveled.push_back(std::move(*point));
+    }
+    nlohmann::json out = {{"frame", number}};
+    for (const auto& p : today) out["intra"].push_back(json_of(p));
+    for (const auto& p : leveled) out["leveled"].push_back(json_of(p));
+    for (const double error : options.errors) {
+        const double before = bytes_at(today, error), now = bytes_at(leveled, error);
+        const bool known = before > 0 && now > 0;
+        if (!options.json)
+            fmt::print("M2 {:g} mm: {}\n", error,
+                       known ? fmt::format("{:.0f} bytes for {:.0f}, ratio {:.3f}", now, before, now / before)
+                             : "not between two points of each");
+        if (known)
+            out["at"].push_back(
+                {{"m2_mm", error}, {"intra_bytes", before}, {"leveled_bytes", now}, {"ratio", now / before}});
+    }
+    return out;
 }
 
 Result<void> run_hierarchy(const Options& options) {
     auto capture = Capture::open(options.capture);
     if (!capture) return tl::unexpected(capture.error());
-    std::size_t number = 0;
-    while (true) {
+    auto frames = nlohmann::json::array();
+    const auto last = std::max_element(options.at.begin(), options.at.end());
+    for (std::size_t number = 0; last != options.at.end() && number <= *last; ++number) {
         auto next = capture->next();
         if (!next) return tl::unexpected(next.error());
         if (!*next) break;
-        if (std::find(options.frames.begin(), options.frames.end(), number++) == options.frames.end()) continue;
-        Mesh mesh = std::move(**next);
-        mesh.colours.clear();
-        mesh.normals.clear();
-        mesh.texcoords.clear();
-        std::vector<Point> today, levelled;
-        for (const double q : options.qualities) {
-            auto point = intra_point(mesh, q);
-            if (!point) return tl::unexpected(point.error());
-            print(*point);
-            today.push_back(std::move(*point));
-        }
-        Lattice lattice;
-        const auto origin = lattice_origin(mesh);
-        if (!origin) return tl::unexpected(origin.error());
-        lattice.origin = *origin;
-        const auto whole = to_lattice(mesh, lattice);
-        if (!whole) return tl::unexpected(whole.error());
-        const auto surface_mesh = welded(*whole, at_same_place(*whole));
-        const auto captured = evenly_sampled(surface_mesh, {});
-        for (const double error : options.base_errors) {
-            auto base = base_mesh(surface_mesh, 16 * error, {});
-            std::vector<float> finer(surface_mesh.positions.size(), 1);
-            for (int again = 0; again < options.refined; ++again) {
-                SurfaceLevels fitted;
-                fitted.depth = {options.levels, static_cast<std::uint32_t>(std::lround(16 * options.edges.front()))};
-                fitted.step = static_cast<std::uint32_t>(std::lround(256 * options.steps.front()));
-                fitted.rules.fill({options.butterfly, options.tangents});
-                const auto subdivision = subdivide(base, fitted.depth, std::size_t{1} << 24);
-                SurfaceFitOptions fit_options;
-                SurfaceFit fit(captured, base, *subdivision, fitted, fit_options);
-                fit.improve(0, 4);
-                const auto shown = fit.surface();
-                const SurfaceIndex index(points_of(shown), subdivision->back().triangles);
-                std::vector<double> distance;
-                double sum = 0;
-                for (const auto& p : surface_mesh.positions) {
-                    distance.push_back(index.closest(point_of(p)).squared_distance);
-                    sum += distance.back();
-                }
-                const double usual = options.outlier * std::sqrt(sum / static_cast<double>(distance.size()));
-                const auto around = vertices_around(surface_mesh.positions.size(), surface_mesh.triangles);
-                std::vector<float> own;
-                for (const double d : distance)
-                    own.push_back(static_cast<float>(std::clamp(std::sqrt(d) / usual, 1.0, 3.0)));
-                for (int ring = 0; ring < 2; ++ring) {
-                    auto wider = own;
-                    for (std::size_t v = 0; v < own.size(); ++v)
-                        for (const auto other : around.of(v)) wider[v] = std::max(wider[v], own[other]);
-                    own = std::move(wider);
-                }
-                for (std::size_t v = 0; v < own.size(); ++v) finer[v] *= own[v];
-                base = base_mesh(surface_mesh, 16 * error, finer);
-            }
-            for (const double base_step : options.base_steps)
-                for (const double finest : options.edges)
-                    for (const double step : options.steps) {
-                        SurfaceLevelsOptions chosen;
-                        chosen.levels.depth.levels = options.levels;
-                        chosen.levels.coarser = options.coarser;
-                        chosen.levels.step = static_cast<std::uint32_t>(std::lround(256 * step));
-                        chosen.levels.depth.longest_edge = static_cast<std::uint32_t>(std::lround(16 * finest));
-                        chosen.lambda = options.lambda;
-                        chosen.levels.rules.fill({options.butterfly, options.tangents});
-                        chosen.fit.least_moved = options.least_moved;
-                        chosen.rounds = options.rounds;
-                        chosen.fit.last_reach = LatticeUnits(16 * options.last_reach);
-                        chosen.fit.farthest = options.farthest;
-                        chosen.fit.agreement = options.agreement;
-                        chosen.fit.back = options.back;
-                        chosen.fit.choices = options.choices;
-                        chosen.fit.iterations = options.iterations;
-                        auto point = levels_point(mesh, lattice, base, captured, base_step, chosen);
-                        if (!point) return tl::unexpected(point.error());
-                        point->setting = fmt::format("base {:g}/{:g} edge {:g} step {:g}", error, base_step, finest, step);
-                        print(*point);
-                        levelled.push_back(std::move(*point));
-                    }
-        }
-        for (const double at : {0.4, 0.8}) {
-            const double a = bytes_at(today, at), b = bytes_at(levelled, at);
-            fmt::print("M2 {:.1f}: today {:.0f}, levels {:.0f}, ratio {:.3f}\n", at, a, b, a > 0 ? b / a : 0);
-        }
+        if (std::find(options.at.begin(), options.at.end(), number) == options.at.end()) continue;
+        auto frame = measure_frame(std::move(**next), number, options);
+        if (!frame) return tl::unexpected(frame.error());
+        frames.push_back(std::move(*frame));
     }
+    if (frames.empty()) return fail(ErrorKind::bad_input, "the capture has none of these frames");
+    if (options.json)
+        fmt::print("{}\n", nlohmann::json{{"program", "htvm-lab " HTVM_VERSION},
+                                          {"input", input_name(options.capture)},
+                                          {"frames", std::move(frames)}}
+                               .dump(1));
     return {};
 }
 
@@ -274,29 +208,49 @@ Result<void> run_hierarchy(const Options& options) {
 
 void add_hierarchy(CLI::App& app, app::Run& run) {
     auto options = std::make_shared<Options>();
-    auto* command = app.add_subcommand("hierarchy", "I-frames beside a base mesh with levels of displacements");
+    auto* command = app.add_subcommand(
+        "hierarchy", "What a base mesh with levels of displacements takes beside an I-frame, at equal error");
     add_capture_options(*command, options->capture);
-    command->add_option("--at", options->frames, "Frames")->delimiter(',');
-    command->add_option("-q,--quality", options->qualities, "Qualities of I-frames")->delimiter(',');
-    command->add_option("--base-errors", options->base_errors, "mm")->delimiter(',');
-    command->add_option("--base-steps", options->base_steps, "mm")->delimiter(',');
-    command->add_option("--steps", options->steps, "mm")->delimiter(',');
-    command->add_option("--edges", options->edges, "mm")->delimiter(',');
-    command->add_option("--levels", options->levels, "");
-    command->add_option("--coarser", options->coarser, "");
-    command->add_option("--rounds", options->rounds, "");
-    command->add_option("--least-moved", options->least_moved, "");
-    command->add_option("--back", options->back, "");
-    command->add_option("--choices", options->choices, "");
-    command->add_option("--iterations", options->iterations, "");
-    command->add_option("--farthest", options->farthest, "");
-    command->add_option("--last-reach", options->last_reach, "");
-    command->add_option("--agreement", options->agreement, "");
-    command->add_option("--refined", options->refined, "");
-    command->add_option("--outlier", options->outlier, "");
-    command->add_option("--lambda", options->lambda, "");
-    command->add_option("--butterfly", options->butterfly, "");
-    command->add_option("--tangents", options->tangents, "");
+    auto& levels = options->levels;
+    command->add_option("--at", options->at, "Frames to measure, separated by commas (default 0, the first)")
+        ->delimiter(',');
+    command->add_option("-q,--quality", options->qualities, "Qualities of the I-frames (default 20,30,...,100)")
+        ->delimiter(',')
+        ->check(CLI::Range(0.0, 100.0));
+    command
+        ->add_option("--steps", options->steps, "Steps of the finest displacements, mm (default 1,1.4,1.9,2.6,3.5,4.7)")
+        ->delimiter(',')
+        ->check(CLI::Range(0.01, 100.0));
+    command->add_option("--errors", options->errors, "Errors (M2, mm) at which bytes are compared (default 0.4,0.8)")
+        ->delimiter(',');
+    command->add_option("--samples", options->samples, "Samples of M2 in each direction (default 200000)");
+    command->add_option("--levels", levels.levels, "Levels below the base (default 3)")
+        ->check(CLI::Range(0u, most_levels));
+    command->add_option("--base-error", levels.base_error, "Error of the base, in steps (default 2)")
+        ->check(CLI::Range(0.01, 100.0));
+    command->add_option("--base-step", levels.base_step, "Step of the base's positions, in steps (default 3.3)")
+        ->check(CLI::Range(0.01, 100.0));
+    command
+        ->add_option("--base-again", levels.base_again,
+                     "How often the base is made finer where much is left (default 1)")
+        ->check(CLI::Range(0, 10));
+    command
+        ->add_option("--longest-edge", levels.longest_edge, "Longest edge of the finest level, in steps (default 4.4)")
+        ->check(CLI::Range(0.01, 1000.0));
+    command->add_option("--coarser", levels.coarser, "A level's step in sixteenths of that below (default 12)")
+        ->check(CLI::Range(1u, 16u));
+    command->add_option("--butterfly", levels.rule.butterfly, "Eighths of the butterfly rule (default 2)")
+        ->check(CLI::Range(0u, 15u));
+    command->add_option("--tangents", levels.rule.tangents, "Eighths of the tangent planes' rule (default 8)")
+        ->check(CLI::Range(0u, 15u));
+    command->add_option("--lambda", levels.lambda, "Squared steps that a bit must spare (default 0.06)");
+    command->add_option("--least-moved", levels.least_moved, "Least displacement, in steps (default 0.7)");
+    command->add_flag("--json", options->json, "Print the result as JSON on standard output");
+    command->footer(
+        "Geometry alone, without the noise filter. One step says how fine everything is. Displacements are those of\n"
+        "the base and of each level, in bytes, and the share of vertices that they move.\n\n"
+        "Example:\n"
+        "  htvm-lab hierarchy capture/ --at 0,30 -q 30,40,50,60");
     command->callback([options, &run] { run = [options] { return run_hierarchy(*options); }; });
 }
 

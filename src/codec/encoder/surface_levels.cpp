@@ -9,6 +9,8 @@
 namespace htvm::internal {
 namespace {
 
+constexpr std::size_t most_vertices = std::size_t{1} << 24;
+
 // The bits of a decision predicted from several contexts, without adapting them.
 template <std::size_t N>
 double mixed_cost(const Mixer<N>& mixer, const std::array<const BinaryModel*, N>& models, bool bit) {
@@ -23,9 +25,9 @@ double cost_of(const DisplacementModels& m, const DisplacementContext& c, std::i
     using C = DisplacementContext;
     const auto at_level = [&](std::size_t classes, std::size_t own) { return c.level * classes + own; };
     double bits = mixed_cost<5>(m.nonzero_mixer[c.level],
-                                {&m.by_beside[at_level(C::besides, c.beside)], &m.by_above[at_level(C::aboves, c.above)],
-                                 &m.by_both[c.beside * C::aboves + c.above], &m.by_bend[at_level(C::bends, c.bend)],
-                                 &m.by_trend[c.trend * C::bends + c.bend]},
+                                {&m.by_beside[at_level(C::besides, c.beside)],
+                                 &m.by_above[at_level(C::aboves, c.above)], &m.by_both[c.beside * C::aboves + c.above],
+                                 &m.by_bend[at_level(C::bends, c.bend)], &m.by_trend[c.trend * C::bends + c.bend]},
                                 value != 0);
     if (value == 0) return bits;
     bits += mixed_cost<2>(
@@ -33,11 +35,11 @@ double cost_of(const DisplacementModels& m, const DisplacementContext& c, std::i
         {&m.sign_by_trend[c.level * C::trends + c.trend], &m.sign_by_bend[at_level(C::bends, c.bend)]}, value < 0);
     const auto rest = static_cast<std::size_t>(std::abs(value)) - 1;
     for (std::size_t i = 0; i < DisplacementModels::unary && i <= rest; ++i)
-        bits += mixed_cost<3>(m.more_mixer[i],
-                              {&m.more_by_beside[at_level(C::besides, c.beside)][i],
-                               &m.more_by_above[at_level(C::aboves, c.above)][i],
-                               &m.more_by_bend[at_level(C::bends, c.bend)][i]},
-                              rest > i);
+        bits += mixed_cost<3>(
+            m.more_mixer[i],
+            {&m.more_by_beside[at_level(C::besides, c.beside)][i], &m.more_by_above[at_level(C::aboves, c.above)][i],
+             &m.more_by_bend[at_level(C::bends, c.bend)][i]},
+            rest > i);
     if (rest >= DisplacementModels::unary)
         bits += 2 * std::log2(static_cast<double>(rest - DisplacementModels::unary) + 1) + 1;
     return bits;
@@ -60,13 +62,15 @@ std::int32_t chosen_value(const DisplacementModels& models, const DisplacementCo
 
 }  // namespace
 
-EncodedSurfaceLevels encode_surface_levels(const SurfaceIndex& captured, const LatticeMesh& base,
-                                           const SurfaceLevelsOptions& options) {
+Result<EncodedSurfaceLevels> encode_surface_levels(const SurfaceIndex& captured, const LatticeMesh& base,
+                                                   const SurfaceLevelsOptions& options) {
     EncodedSurfaceLevels out;
     RangeEncoder encoder;
     WritingCoder<RangeEncoder> coder{encoder};
     const auto levels = code_levels_header(coder, options.levels);
-    const auto subdivision = *subdivide(base, levels.depth, std::size_t{1} << 24);
+    const auto whole = subdivide(base, levels.depth, most_vertices);
+    if (!whole) return fail(ErrorKind::limit, "surface levels: more vertices than can be coded; ask for longer edges");
+    const auto& subdivision = *whole;
     SurfaceFit fit(captured, base, subdivision, levels, options.fit);
     fit.improve(0, options.rounds);
     std::vector<std::int32_t> values;
@@ -76,7 +80,8 @@ EncodedSurfaceLevels encode_surface_levels(const SurfaceIndex& captured, const L
     for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) {
         const auto* level = k > 0 ? &subdivision[k - 1] : nullptr;
         const auto& above = k > 1 ? subdivision[k - 2].triangles : base.triangles;
-        const auto expected = level ? expected_level(*level, positions, above, levels.rules[k - 1]) : expected_base(base);
+        const auto expected =
+            level ? expected_level(*level, positions, above, levels.rules[k - 1]) : expected_base(base);
         const std::size_t first = positions.size();
         const auto step = step_at(levels, k);
         const double in_steps = (1 << displacement_bits) / static_cast<double>(step);
@@ -93,7 +98,7 @@ EncodedSurfaceLevels encode_surface_levels(const SurfaceIndex& captured, const L
                                return value;
                            });
         if (k < levels.depth.levels) fit.improve(k + std::size_t{1}, 1);
-        out.parts.push_back({positions.size() - first, moved, static_cast<double>(encoder.position() - position)});
+        out.parts.push_back({positions.size() - first, moved, encoder.position() - position});
         position = encoder.position();
     }
     out.run = encoder.finish();

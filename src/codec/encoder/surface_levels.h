@@ -14,8 +14,8 @@ namespace htvm::internal {
 
 struct SurfaceLevelsOptions {
     SurfaceLevels levels;
-    double lambda = 0.12;  // squared steps that a bit must spare
-    int rounds = 5;        // of the fit
+    double lambda = 0.06;  // squared steps that a bit must spare
+    int rounds = 5;        // of the fit, before the first level is coded
     SurfaceFitOptions fit;
 };
 
@@ -23,14 +23,14 @@ struct EncodedSurfaceLevels {
     std::vector<std::uint8_t> run;
     LeveledSurface surface;  // that the decoder will have
     struct Part {
-        std::size_t vertices = 0, moved = 0;
-        double bytes = 0;
+        std::size_t vertices = 0, moved = 0;  // and how many of them are displaced
+        std::size_t bytes = 0;
     };
     std::vector<Part> parts;  // the base's displacements, then each level's
 };
 
-// captured: with a grid for searches by direction. base: decoded.
-EncodedSurfaceLevels encode_surface_levels(const SurfaceIndex& captured, const LatticeMesh& base,
-                                           const SurfaceLevelsOptions& options);
+// captured: evenly_sampled(). base: decoded, with triangles. Errors: limit if there would be too many vertices.
+Result<EncodedSurfaceLevels> encode_surface_levels(const SurfaceIndex& captured, const LatticeMesh& base,
+                                                   const SurfaceLevelsOptions& options);
 
 }  // namespace htvm::internal

@@ -7,8 +7,8 @@ namespace htvm::internal {
 
 SurfaceIndex evenly_sampled(const LatticeMesh& captured, Threads threads) {
     constexpr std::size_t most_vertices = std::size_t{1} << 22;
-    const double edge = mean_edge(captured.positions, captured.triangles, 8);
-    const SubdivisionDepth depth{.levels = 5, .longest_edge = static_cast<std::uint32_t>(std::max(1.0, 2 * edge))};
+    const double edge = std::max(1.0, mean_edge(captured.positions, captured.triangles, 8));
+    const SubdivisionDepth depth{.levels = 5, .longest_edge = static_cast<std::uint32_t>(2 * edge)};
     auto points = points_of(captured.positions);
     const auto levels = subdivide(captured, depth, most_vertices);
     const bool even = levels && !levels->empty();
@@ -16,7 +16,8 @@ SurfaceIndex evenly_sampled(const LatticeMesh& captured, Threads threads) {
         for (const auto& level : *levels)
             for (const auto& s : level.stencils)
                 points.push_back(to_floats((to_vector(points[s.a]) + to_vector(points[s.b])) * 0.5));
-    return {points, even ? levels->back().triangles : captured.triangles,
+    return {points,
+            even ? levels->back().triangles : captured.triangles,
             {.cell = static_cast<float>(2 * edge), .threads = threads}};
 }
 
@@ -84,11 +85,10 @@ void SurfaceFit::rebuild() {
 void SurfaceFit::find_samples() {
     const auto& triangles = subdivision_.empty() ? base_.triangles : subdivision_.back().triangles;
     const double edge = mean_edge(positions_, triangles, 8);
-    const SurfaceIndex shown(points_of(positions_), triangles,
-                             {.cell = static_cast<float>(std::max(2 * edge, options_.reach.value / 24)),
-                              .threads = options_.threads});
-    const auto found = closest_facing(shown, points_, facing_,
-                                      {.reach = reach_, .agreement = options_.agreement},
+    const SurfaceIndex shown(
+        points_of(positions_), triangles,
+        {.cell = static_cast<float>(std::max(2 * edge, options_.reach.value / 24)), .threads = options_.threads});
+    const auto found = closest_facing(shown, points_, facing_, {.reach = reach_, .agreement = options_.agreement},
                                       options_.threads, guesses_);
     samples_.clear();
     for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -114,9 +114,9 @@ void SurfaceFit::find_samples_back(std::span<const Triangle> triangles) {
     std::vector<Point3f> facing;
     for (const auto& n : normals) facing.push_back(to_floats(n));
     guesses_back_.resize(positions_.size(), OrientedPoints::no_point);
-    const auto found = closest_facing(captured_, points_of(positions_), facing,
-                                      {.reach = reach_, .agreement = options_.agreement},
-                                      options_.threads, guesses_back_);
+    const auto found =
+        closest_facing(captured_, points_of(positions_), facing, {.reach = reach_, .agreement = options_.agreement},
+                       options_.threads, guesses_back_);
     for (std::uint32_t v = 0; v < positions_.size(); ++v) {
         if (!found[v].found()) continue;
         const double residual = dot(to_vector(found[v].point) - to_vector(positions_[v]), normals[v]);
@@ -188,7 +188,8 @@ std::vector<double> SurfaceFit::gradient(std::span<const Vector3d> moved, bool r
         for (std::size_t i = 0; i < 3; ++i)
             residual -= static_cast<double>(s.shares[i]) * dot(moved[s.corners[i]], s.normal);
         const Vector3d force = s.normal * (residual * s.weight);
-        for (std::size_t i = 0; i < 3; ++i) pull[s.corners[i]] = pull[s.corners[i]] + force * static_cast<double>(s.shares[i]);
+        for (std::size_t i = 0; i < 3; ++i)
+            pull[s.corners[i]] = pull[s.corners[i]] + force * static_cast<double>(s.shares[i]);
     }
     std::vector<double> out(moved.size());
     for (std::size_t k = subdivision_.size(); k > 0; --k) {
@@ -294,7 +295,8 @@ void SurfaceFit::choose_and_solve(std::size_t first) {
 void SurfaceFit::improve(std::size_t first, int rounds) {
     for (int round = 0; round < rounds; ++round) {
         rebuild();
-        reach_ = static_cast<float>(std::max(options_.reach.value / (1 << std::min(rounds_++, 8)), options_.last_reach.value));
+        reach_ = static_cast<float>(
+            std::max(options_.reach.value / (1 << std::min(rounds_++, 8)), options_.last_reach.value));
         find_samples();
         std::fill(change_.begin(), change_.end(), 0);
         for (int i = 0; i < options_.choices; ++i) choose_and_solve(begin_of(first));

@@ -16,18 +16,19 @@
 namespace htvm::internal {
 
 struct SurfaceFitOptions {
-    LatticeUnits reach{480};  // how far the surfaces may be apart at first
+    LatticeUnits reach{480};      // how far the surfaces may be apart at first
     LatticeUnits last_reach{96};  // and in the end
-    float agreement = 0.6F;
-    double farthest = 0.5;
+    float agreement = 0.6F;       // least dot product of the normals of what belongs together
     double least_moved = 0.7;  // a displacement that spares less than one of so many steps of the finest level is none
-    double back = 1;  // weight of the shown surface's vertices beside that of the captured surface
-    int choices = 3, iterations = 6;
+    double farthest = 0.5;     // of a displacement, in lengths of the edge that was split
+    double back = 1;           // weight of the shown surface's vertices beside that of the captured surface
+    int choices = 3;           // of displacements that are worth their bits, in each round
+    int iterations = 6;        // of conjugate gradients, for each choice
     Threads threads = {};
 };
 
-// The captured surface as it is searched and sampled here: long triangles, as those of a sole, are cut into smaller ones
-// that lie in them, since searches by direction go by vertices.
+// The captured surface as it is searched and sampled here: long triangles, as those of a sole, are cut into smaller
+// ones that lie in them, since searches by direction go by vertices.
 SurfaceIndex evenly_sampled(const LatticeMesh& captured, Threads threads);
 
 class SurfaceFit {
@@ -71,17 +72,17 @@ private:
     std::span<const SubdivisionLevel> subdivision_;
     const SurfaceLevels& levels_;
     const SurfaceFitOptions& options_;
-    std::vector<Point3f> points_, facing_;  // of the captured surface
-    std::vector<float> areas_;
+    std::vector<Point3f> points_, facing_;  // samples of the captured surface
+    std::vector<float> areas_;              // that each stands for
     std::vector<std::uint32_t> guesses_, guesses_back_;
-    std::vector<double> displacements_, change_, weights_, mass_;
-    double finest_mass_ = 1;
-    std::vector<double> farthest_;
+    std::vector<double> displacements_, change_, farthest_, weights_;
+    std::vector<double> mass_;  // area of the surface that each displacement moves
+    double finest_mass_ = 1;    // mean of the finest level
     float reach_ = 0;
-    int rounds_ = 0;
+    int rounds_ = 0;  // so far
     std::vector<LatticePoint> positions_;
-    std::vector<Vector3d> normals_;            // along which each vertex is displaced
-    std::vector<std::vector<Vector3d>> above_;  // by level
+    std::vector<Vector3d> normals_;             // along which each vertex is displaced
+    std::vector<std::vector<Vector3d>> above_;  // by level, the normals of all vertices above
     std::vector<Sample> samples_;
 };
 

@@ -164,7 +164,7 @@ Vector3d tangents_offset(std::span<const LatticePoint> positions, std::span<cons
 }
 
 Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
-                          const EdgeStencil& stencil, const SubdivisionRule& rule) {
+                         const EdgeStencil& stencil, const SubdivisionRule& rule) {
     Vector3d out = (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
     if (rule.butterfly > 0) {
         const auto offset = butterfly_offset(positions, stencil);

@@ -36,10 +36,10 @@ MeshEdges find_edges(std::size_t vertices, std::span<const Triangle> triangles);
 
 // What a new vertex on an edge is predicted from. Vertices are equal, or no_element, where there are none.
 struct EdgeStencil {
-    std::uint32_t a = 0, b = 0;                             // its ends
-    std::array<std::uint32_t, 2> across{};                  // the third corner of each triangle beside it
-    std::array<std::array<std::uint32_t, 2>, 2> wings{};    // behind each triangle: across its sides at a and at b
-    std::array<std::uint32_t, 2> along{};                   // of an edge at a border: the border's vertices beyond a, b
+    std::uint32_t a = 0, b = 0;                           // its ends
+    std::array<std::uint32_t, 2> across{};                // the third corner of each triangle beside it
+    std::array<std::array<std::uint32_t, 2>, 2> wings{};  // behind each triangle: across its sides at a and at b
+    std::array<std::uint32_t, 2> along{};                 // of an edge at a border: the border's vertices beyond a, b
 };
 
 // The stencils of some edges of a mesh.
@@ -73,23 +73,25 @@ std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const
                                       std::span<const std::uint32_t> vertex_of_edge);
 
 struct SubdivisionLevel {
-    std::uint32_t first = 0;             // the number of its first new vertex
-    std::vector<EdgeStencil> stencils;   // of each new vertex
+    std::uint32_t first = 0;            // the number of its first new vertex
+    std::vector<EdgeStencil> stencils;  // of each new vertex
     // The new vertices before it on the other sides of the triangles beside its edge, or no_element.
     std::vector<std::array<std::uint32_t, 4>> beside;
-    std::vector<Triangle> triangles;     // after it
+    std::vector<Triangle> triangles;  // after it
 };
 
 struct SubdivisionDepth {
     std::uint32_t levels = 3;  // how often edges are split, 0..most_levels
-    // An edge that is longer is split to make the last level, > 0, lattice units; one twice as long to make the last but
-    // one, and so on: levels come first where the base is coarse, and all triangles of the finest are about as large.
+    // An edge that is longer is split to make the last level, > 0, lattice units; one twice as long to make the last
+    // but one, and so on: levels come first where the base is coarse, and all triangles of the finest are about as
+    // large.
     std::uint32_t longest_edge = 160;
 };
 inline constexpr std::uint32_t most_levels = 8;
 
 // All levels of a base mesh. They follow from the base alone, not from how its surface is moved: lengths are those on
-// the base's flat triangles. base: on the lattice, indices in range. Nothing if there would be more vertices than these.
+// the base's flat triangles. base: on the lattice, indices in range. Nothing if there would be more vertices than
+// these.
 std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
                                                        std::size_t most_vertices);
 

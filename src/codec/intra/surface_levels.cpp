@@ -59,8 +59,7 @@ ExpectedLevel expected_level(const SubdivisionLevel& level, std::span<const Latt
     for (const auto& stencil : level.stencils) {
         out.at.push_back(expected_vertex(positions, normals, stencil, rule));
         out.normal.push_back(normalised(normals[stencil.a] + normals[stencil.b]));
-        const Vector3d off =
-            out.at.back() - (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
+        const Vector3d off = out.at.back() - (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
         out.bent.push_back(dot(off, off));
     }
     return out;

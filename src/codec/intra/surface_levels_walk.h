@@ -84,7 +84,8 @@ std::int32_t code_displacement(Coder& coder, DisplacementModels& m, const Displa
         const std::uint32_t low = coder.raw(left & ((1u << top) - 1), top);
         coded += ((1u << top) | low) - 1;
     }
-    const auto magnitude = static_cast<std::int32_t>(std::min(coded, static_cast<std::uint32_t>(most_displacement) - 1)) + 1;
+    const auto magnitude =
+        static_cast<std::int32_t>(std::min(coded, static_cast<std::uint32_t>(most_displacement) - 1)) + 1;
     return negative ? -magnitude : magnitude;
 }
 
@@ -106,7 +107,7 @@ SurfaceLevels code_levels_header(Coder& coder, const SurfaceLevels& wanted) {
 // The vertices of a level before they are moved. Of the base, where it has them.
 struct ExpectedLevel {
     std::vector<Vector3d> at, normal;
-    std::vector<double> bent;  // squared, how far off the middle of its edge each is expected; 0 for the base
+    std::vector<double> bent;     // squared, how far off the middle of its edge each is expected; 0 for the base
     std::vector<Vector3d> above;  // the normals of all vertices of the levels above
 };
 ExpectedLevel expected_base(const LatticeMesh& base);
