@@ -68,13 +68,22 @@ void SurfaceFit::rebuild() {
             positions_.push_back({within_lattice(std::llround(at[0])), within_lattice(std::llround(at[1])),
                                   within_lattice(std::llround(at[2]))});
         }
-        // Beyond a triangle's own size a surface folds.
-        if (k > 0)
+        // Beyond its surroundings' own size a surface folds.
+        if (k == 0) {
+            const auto around = vertices_around(positions_.size(), base_.triangles);
+            for (std::size_t v = 0; v < positions_.size(); ++v) {
+                double sum = 0;
+                for (const auto other : around.of(v)) sum += length(to_vector(positions_[other]) - to_vector(positions_[v]));
+                if (!around.of(v).empty())
+                    farthest_[v] = options_.farthest * sum / static_cast<double>(around.of(v).size());
+            }
+        } else {
             for (std::size_t i = 0; i < expected.at.size(); ++i) {
                 const auto& stencil = subdivision_[k - 1].stencils[i];
                 farthest_[subdivision_[k - 1].first + i] =
                     options_.farthest * length(to_vector(positions_[stencil.b]) - to_vector(positions_[stencil.a]));
             }
+        }
         normals_.insert(normals_.end(), expected.normal.begin(), expected.normal.end());
         above_.push_back(std::move(expected.above));
         if (k > 0) triangles = &subdivision_[k - 1].triangles;
@@ -245,7 +254,7 @@ void SurfaceFit::solve(std::span<const std::uint8_t> is_free) {
     const auto preconditioned = [&](std::span<const double> x) {
         std::vector<double> out(x.size(), 0);
         for (std::size_t v = 0; v < x.size(); ++v)
-            if (is_free[v] != 0) out[v] = x[v] / mass_[v];
+            if (is_free[v] != 0) out[v] = x[v] / (mass_[v] + options_.held * finest_mass_);
         return out;
     };
     const auto product = [](std::span<const double> x, std::span<const double> y) {
@@ -253,11 +262,16 @@ void SurfaceFit::solve(std::span<const std::uint8_t> is_free) {
         for (std::size_t v = 0; v < x.size(); ++v) sum += x[v] * y[v];
         return sum;
     };
-    auto rest = restricted(gradient(moved_by(change_), true));
+    const double held = options_.held * finest_mass_;
+    auto rest = gradient(moved_by(change_), true);
+    for (std::size_t v = 0; v < rest.size(); ++v) rest[v] -= held * (displacements_[v] + change_[v]);
+    rest = restricted(std::move(rest));
     auto along = preconditioned(rest);
     double before = product(rest, along);
     for (int i = 0; i < options_.iterations && before > 0; ++i) {
-        auto bent = restricted(gradient(moved_by(along), false));
+        auto bent = gradient(moved_by(along), false);
+        for (std::size_t v = 0; v < bent.size(); ++v) bent[v] -= held * along[v];
+        bent = restricted(std::move(bent));
         const double curvature = -product(along, bent);
         if (!(curvature > 0)) break;
         const double far = before / curvature;
@@ -287,7 +301,7 @@ void SurfaceFit::choose_and_solve(std::size_t first) {
         if (is_free[v] == 0) continue;
         double now = displacements_[v] + change_[v];
         if (std::abs(now) < least(v)) now = 0;
-        if (v >= base_.positions.size()) now = std::clamp(now, -farthest_[v], farthest_[v]);
+        now = std::clamp(now, -farthest_[v], farthest_[v]);
         change_[v] = now - displacements_[v];
     }
 }
