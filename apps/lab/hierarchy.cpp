@@ -226,7 +226,7 @@ void add_hierarchy(CLI::App& app, app::Run& run) {
     command->add_option("--samples", options->samples, "Samples of M2 in each direction (default 200000)");
     command->add_option("--levels", levels.levels, "Levels below the base (default 3)")
         ->check(CLI::Range(0u, most_levels));
-    command->add_option("--base-error", levels.base_error, "Error of the base, in steps (default 2)")
+    command->add_option("--base-error", levels.base_error, "Error of the base, in steps (default 1.8)")
         ->check(CLI::Range(0.01, 100.0));
     command->add_option("--base-step", levels.base_step, "Step of the base's positions, in steps (default 3.3)")
         ->check(CLI::Range(0.01, 100.0));
@@ -235,7 +235,7 @@ void add_hierarchy(CLI::App& app, app::Run& run) {
                      "How often the base is made finer where much is left (default 1)")
         ->check(CLI::Range(0, 10));
     command
-        ->add_option("--longest-edge", levels.longest_edge, "Longest edge of the finest level, in steps (default 4.4)")
+        ->add_option("--longest-edge", levels.longest_edge, "Longest edge of the finest level, in steps (default 3.7)")
         ->check(CLI::Range(0.01, 1000.0));
     command->add_option("--coarser", levels.coarser, "A level's step in sixteenths of that below (default 12)")
         ->check(CLI::Range(1u, 16u));

@@ -21,7 +21,11 @@ LatticeMesh one_vertex_a_place(const LatticeMesh& captured) {
     return out;
 }
 
-std::uint32_t at_least_one(double x) { return static_cast<std::uint32_t>(std::max(1LL, std::llround(x))); }
+// As a header can hold it.
+std::uint32_t in_header(double x) {
+    constexpr double most = 1 << 20;
+    return static_cast<std::uint32_t>(std::lround(std::clamp(x, 1.0, most)));
+}
 
 }  // namespace
 
@@ -29,7 +33,7 @@ Result<LeveledIntra> encode_leveled_intra(const LatticeMesh& captured, const Lev
     const auto whole = one_vertex_a_place(captured);
     if (whole.triangles.empty()) return fail(ErrorKind::bad_input, "a mesh without triangles has no surface to level");
     const auto sampled = evenly_sampled(whole, options.threads);
-    const SubdivisionDepth depth{options.levels, at_least_one(options.longest_edge * options.step.value)};
+    const SubdivisionDepth depth{options.levels, in_header(options.longest_edge * options.step.value)};
     LeveledBaseOptions base_options;
     base_options.surface_error = options.base_error * options.step;
     base_options.again = options.base_again;
@@ -40,7 +44,7 @@ Result<LeveledIntra> encode_leveled_intra(const LatticeMesh& captured, const Lev
     const auto base = leveled_base(whole, sampled, base_options);
     LeveledIntra out;
     IntraFrameOptions intra;
-    intra.geometry_step = static_cast<std::int32_t>(at_least_one(options.base_step * options.step.value));
+    intra.geometry_step = static_cast<std::int32_t>(in_header(options.base_step * options.step.value));
     intra.merge_duplicates = false;  // vertices that fall together would join sheets that do not touch
     intra.threads = options.threads;
     auto decoded = encode_intra_frame(base, intra, out.base);
@@ -48,7 +52,7 @@ Result<LeveledIntra> encode_leveled_intra(const LatticeMesh& captured, const Lev
     out.decoded_base = std::move(*decoded);
     SurfaceLevelsOptions levels;
     levels.levels.depth = depth;
-    levels.levels.step = at_least_one(options.step.value * (1 << displacement_bits));
+    levels.levels.step = in_header(options.step.value * (1 << displacement_bits));
     levels.levels.coarser = options.coarser;
     levels.levels.rules.fill(options.rule);
     levels.lambda = options.lambda;

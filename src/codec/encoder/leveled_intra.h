@@ -14,8 +14,8 @@ namespace htvm::internal {
 
 struct LeveledIntraOptions {
     LatticeUnits step{29};       // of the finest level's displacements, > 0
-    double base_error = 2;       // of the base's simplification, in steps
-    double longest_edge = 4.4;   // of the finest level's triangles, in steps
+    double base_error = 1.8;     // of the base's simplification, in steps
+    double longest_edge = 3.7;   // of the finest level's triangles, in steps
     double base_step = 3.3;      // of the base's positions, in steps
     std::uint32_t levels = 3;    // 0..most_levels
     std::uint32_t coarser = 12;  // see SurfaceLevels

@@ -73,7 +73,8 @@ void SurfaceFit::rebuild() {
             const auto around = vertices_around(positions_.size(), base_.triangles);
             for (std::size_t v = 0; v < positions_.size(); ++v) {
                 double sum = 0;
-                for (const auto other : around.of(v)) sum += length(to_vector(positions_[other]) - to_vector(positions_[v]));
+                for (const auto other : around.of(v))
+                    sum += length(to_vector(positions_[other]) - to_vector(positions_[v]));
                 if (!around.of(v).empty())
                     farthest_[v] = options_.farthest * sum / static_cast<double>(around.of(v).size());
             }

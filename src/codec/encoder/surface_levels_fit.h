@@ -23,8 +23,8 @@ struct SurfaceFitOptions {
     double farthest = 0.5;     // of a displacement, in lengths of the edge that was split
     double back = 1;           // weight of the shown surface's vertices beside that of the captured surface
     double held = 0.05;  // weight by which each is held at none, in those of the finest level: where nothing is near
-    int choices = 3;           // of displacements that are worth their bits, in each round
-    int iterations = 6;        // of conjugate gradients, for each choice
+    int choices = 3;     // of displacements that are worth their bits, in each round
+    int iterations = 6;  // of conjugate gradients, for each choice
     Threads threads = {};
 };
 

@@ -237,6 +237,11 @@ std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, 
             split.push_back(e);
         }
         if (split.size() > most_vertices - std::min<std::size_t>(level.first, most_vertices)) return std::nullopt;
+        // Triangles may lie on each other, and grow though vertices do not.
+        std::size_t cut = triangles.size();
+        for (std::uint32_t e = 0; e < edges.size(); ++e)
+            if (vertex_of_edge[e] != no_element) cut += edges.sides[e];
+        if (cut > 4 * most_vertices) return std::nullopt;
         level.stencils = edge_stencils(flat.size(), triangles, edges, split);
         for (const auto own : split) {
             std::array<std::uint32_t, 4> beside{no_element, no_element, no_element, no_element};
