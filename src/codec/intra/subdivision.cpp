@@ -177,7 +177,7 @@ Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<cons
 }
 
 std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
-                                      std::span<const std::uint32_t> vertex_of_edge) {
+                                      std::span<const std::uint32_t> vertex_of_edge, std::span<const Vector3d> places) {
     std::vector<Triangle> out;
     out.reserve(4 * triangles.size());
     for (std::size_t t = 0; t < triangles.size(); ++t) {
@@ -202,8 +202,14 @@ std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const
             out.push_back({a, ab, c});
             out.push_back({ab, b, c});
         } else if (split == 2) {
-            out.push_back({a, b, bc});
-            out.push_back({a, bc, ca});
+            const Vector3d from_a = places[bc] - places[a], from_b = places[ca] - places[b];
+            if (dot(from_a, from_a) <= dot(from_b, from_b)) {
+                out.push_back({a, b, bc});
+                out.push_back({a, bc, ca});
+            } else {
+                out.push_back({a, b, ca});
+                out.push_back({b, bc, ca});
+            }
             out.push_back({ca, bc, c});
         } else {
             out.push_back({a, ab, ca});
@@ -253,8 +259,8 @@ std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, 
             }
             level.beside.push_back(beside);
         }
-        level.triangles = split_triangles(triangles, edges, vertex_of_edge);
         for (const auto e : split) flat.push_back((flat[edges.ends[e][0]] + flat[edges.ends[e][1]]) * 0.5);
+        level.triangles = split_triangles(triangles, edges, vertex_of_edge, flat);
         out.push_back(std::move(level));
     }
     return out;

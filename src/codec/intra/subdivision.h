@@ -66,11 +66,11 @@ Vector3d tangents_offset(std::span<const LatticePoint> positions, std::span<cons
 Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                          const EdgeStencil& stencil, const SubdivisionRule& rule);
 
-// The triangles after the edges with a new vertex are split. vertex_of_edge: the number of each edge's new vertex, or
-// no_element. In the order of the triangles that they are cut from; of a triangle with two sides split, the remaining
-// quadrangle is cut from the first corner that is not between them.
+// The triangles after the edges with a new vertex are split, in the order of those that they are cut from. places: of
+// all vertices, old and new. vertex_of_edge: the number of each edge's new vertex, or no_element. Where two sides are
+// split, the quadrangle that remains is cut along its shorter diagonal.
 std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
-                                      std::span<const std::uint32_t> vertex_of_edge);
+                                      std::span<const std::uint32_t> vertex_of_edge, std::span<const Vector3d> places);
 
 struct SubdivisionLevel {
     std::uint32_t first = 0;            // the number of its first new vertex
