@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
         "  htvm-lab reproduce CAPTURE -o out/report   the published experiments, as one page to look at\n"
         "  htvm-lab bake CAPTURE -o out/baked         a textured capture's pictures in the layout of a stream's "
         "charts\n"
+        "  htvm-lab hierarchy CAPTURE                 a base mesh with levels of displacements beside I-frames\n"
         "Or with nothing at all: they make a synthetic one, whose truth is known.\n"
         "  htvm-lab events --motion fast              whether hands and feet are followed\n"
         "  htvm-lab endure --minutes 5                whether anything grows with time";

@@ -205,7 +205,7 @@ TEST(LeveledIntra, a_border_stays_where_it_is) {
             sheet.positions.push_back(
                 {static_cast<std::int32_t>(x) * 50, static_cast<std::int32_t>(y) * 50,
                  static_cast<std::int32_t>(std::lround(80 * std::sin(0.15 * x) * std::cos(0.1 * y)))});
-    const auto coded = encode_leveled_intra(sheet, {.step = LatticeUnits(20)});
+    const auto coded = encode_leveled_intra(sheet, {.step = LatticeUnits(5)});
     ASSERT_TRUE(coded);
     const auto& surface = coded->levels.surface;
     EXPECT_LT(rms_between(sheet.positions, surface.positions, surface.triangles), 15);
