@@ -11,5 +11,6 @@ void add_reproduce(CLI::App& app, app::Run& run);
 void add_events(CLI::App& app, app::Run& run);
 void add_endure(CLI::App& app, app::Run& run);
 void add_bake(CLI::App& app, app::Run& run);
+void add_hierarchy(CLI::App& app, app::Run& run);
 
 }  // namespace htvm::lab

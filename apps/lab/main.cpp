@@ -14,10 +14,11 @@ int main(int argc, char** argv) {
         "  htvm-lab reproduce CAPTURE -o out/report   the published experiments, as one page to look at\n"
         "  htvm-lab bake CAPTURE -o out/baked         a textured capture's pictures in the layout of a stream's "
         "charts\n"
+        "  htvm-lab hierarchy CAPTURE                 a base mesh with levels of displacements beside I-frames\n"
         "Or with nothing at all: they make a synthetic one, whose truth is known.\n"
         "  htvm-lab events --motion fast              whether hands and feet are followed\n"
         "  htvm-lab endure --minutes 5                whether anything grows with time";
-    program.commands = {add_rd, add_decoding, add_reproduce, add_events, add_endure, add_bake};
+    program.commands = {add_rd, add_decoding, add_reproduce, add_events, add_endure, add_bake, add_hierarchy};
     for (const char* name : {"synth", "encode", "decode", "info", "calibrate", "compare"})
         program.elsewhere[name] = std::string("htvm ") + name;
     return run_program(program, argc, argv);

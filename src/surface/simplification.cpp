@@ -201,6 +201,7 @@ struct Work {
     std::vector<std::uint32_t> ages{};
     std::vector<std::uint32_t> marks{};  // what a walk around a vertex has met
     std::vector<std::uint8_t> regions{};
+    std::vector<float> finer{};  // as SimplificationOptions::finer, or none
 };
 
 Vector3d area_normal(const Vector3d& a, const Vector3d& b, const Vector3d& c) { return (b - a).cross(c - a); }
@@ -416,7 +417,8 @@ void Simplifier::judge(std::uint32_t a, std::uint32_t b) {
     double cost = colour_a.merged_squares(colour_b) / (colour_a.count + colour_b.count) /
                   (options.colour_error * options.colour_error);
     if (!(cost <= 1)) return;
-    cost += merged(a, b).squared_distance / (options.surface_error * options.surface_error);
+    const double finer = work.finer.empty() ? 1 : static_cast<double>(std::max(work.finer[a], work.finer[b]));
+    cost += merged(a, b).squared_distance * finer * finer / (options.surface_error * options.surface_error);
     if (cost <= 1) queue.push(cost, {std::min(a, b), std::max(a, b), work.ages[a] + work.ages[b]});
 }
 
@@ -492,6 +494,7 @@ void Simplifier::collapse(std::uint32_t keep, std::uint32_t drop, const Vector3d
     work.positions[keep] = to;
     work.quadrics[keep].add(work.quadrics[drop]);
     work.colours[keep].add(work.colours[drop]);
+    if (!work.finer.empty()) work.finer[keep] = std::max(work.finer[keep], work.finer[drop]);
     work.ages[drop] = dropped;
     ++work.ages[keep];
     ring.clear();  // the triangles that keep takes over
@@ -565,6 +568,7 @@ SimplifiedMesh simplify(std::span<const Vector3d> positions, std::span<const Tri
               .triangles = {triangles.begin(), triangles.end()}};
     const auto vertices = positions.size();
     work.ages.assign(vertices, 0);
+    work.finer.assign(options.finer.begin(), options.finer.end());
     work.colours.resize(vertices);
     for (std::size_t v = 0; v < colours.size(); ++v)
         for (std::size_t c = 0; c < 3; ++c) work.colours[v].mean[c] = colours[v][c];

@@ -28,7 +28,7 @@ expect 0 "htvm-lab " "$lab" --version
 expect 2 "" "$lab"
 expect 2 "htvm-lab: error: there is no command 'nonsense'; 'htvm-lab --help' lists them" "$lab" nonsense
 expect 2 "it is 'htvm encode'" "$lab" encode capture -o x.htvm
-for command in rd decoding reproduce events endure bake; do expect 0 "Usage" "$lab" $command --help; done
+for command in rd decoding reproduce events endure bake hierarchy; do expect 0 "Usage" "$lab" $command --help; done
 
 # The sweep: tables, or only JSON on standard output; stored results are used again.
 expect 2 "--output is required" "$lab" rd capture
@@ -54,6 +54,12 @@ expect 1 "there is no frame" "$lab" decoding "$lab"
 
 # The worst regions and what patches replace, on request.
 expect 0 "of I, mm" "$lab" rd capture -o regions -q 40 --coders htvm-t --metrics m2,regions
+
+# Levels of a surface beside I-frames.
+expect 0 "M2 20 mm: " "$lab" hierarchy capture -q 5,80 --steps 5,40 --errors 20 --samples 2000
+"$lab" hierarchy capture --at 1 -q 20 --steps 20 --samples 2000 --json 2>/dev/null | grep -q '"base_position_bytes"' ||
+    { echo "FAILED: no breakdown of levels as JSON"; failures=$((failures + 1)); }
+expect 1 "the capture has none of these frames" "$lab" hierarchy capture --at 7 -q 20
 
 # Of an open capture also coverage, and bits at equal M2 over it.
 mkdir sheet

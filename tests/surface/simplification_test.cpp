@@ -99,6 +99,20 @@ TEST(Simplification, collapses_nothing_without_an_error_to_spend) {
     EXPECT_TRUE(out.colours.empty());
 }
 
+TEST(Simplification, where_it_must_be_finer_more_is_kept) {
+    const auto input = sphere(100, 24);
+    std::vector<float> finer(input.positions.size());
+    for (std::size_t v = 0; v < finer.size(); ++v) finer[v] = input.positions[v].z() > 0 ? 4 : 1;
+    SimplificationOptions options;
+    options.surface_error = 3;
+    options.finer = finer;
+    const auto out = simplify(input.positions, input.triangles, {}, options);
+    expect_sound(out);
+    std::size_t above = 0, below = 0;
+    for (const auto& p : out.positions) ++(p.z() > 0 ? above : below);
+    EXPECT_GT(above, 2 * below);
+}
+
 TEST(Simplification, a_flat_square_keeps_its_outline_and_little_else) {
     const auto out = simplified(plane(20), 0.01);
     expect_sound(out);

@@ -1,0 +1,67 @@
+#include "codec/encoder/leveled_intra.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "codec/encoder/leveled_base.h"
+#include "codec/encoder/surface_levels_fit.h"
+#include "codec/intra/duplicates.h"
+#include "codec/intra/intra_frame.h"
+
+namespace htvm::internal {
+namespace {
+
+// Positions and triangles with one vertex at a place: seams are no borders.
+LatticeMesh one_vertex_a_place(const LatticeMesh& captured) {
+    LatticeMesh places;
+    places.positions = captured.positions;
+    const auto merging = find_duplicates(places);
+    auto out = kept_vertices(places, merging.kept);
+    out.triangles = merged_triangles(captured.triangles, merging, false);
+    return out;
+}
+
+// As a header can hold it.
+std::uint32_t in_header(double x) {
+    constexpr double most = 1 << 20;
+    return static_cast<std::uint32_t>(std::lround(std::clamp(x, 1.0, most)));
+}
+
+}  // namespace
+
+Result<LeveledIntra> encode_leveled_intra(const LatticeMesh& captured, const LeveledIntraOptions& options) {
+    const auto whole = one_vertex_a_place(captured);
+    if (whole.triangles.empty()) return fail(ErrorKind::bad_input, "a mesh without triangles has no surface to level");
+    const auto sampled = evenly_sampled(whole, options.threads);
+    const SubdivisionDepth depth{options.levels, in_header(options.longest_edge * options.step.value)};
+    LeveledBaseOptions base_options;
+    base_options.surface_error = options.base_error * options.step;
+    base_options.again = options.base_again;
+    base_options.depth = depth;
+    base_options.rule = options.rule;
+    base_options.step = options.step;
+    base_options.threads = options.threads;
+    const auto base = leveled_base(whole, sampled, base_options);
+    LeveledIntra out;
+    IntraFrameOptions intra;
+    intra.geometry_step = static_cast<std::int32_t>(in_header(options.base_step * options.step.value));
+    intra.merge_duplicates = false;  // vertices that fall together would join sheets that do not touch
+    intra.threads = options.threads;
+    auto decoded = encode_intra_frame(base, intra, out.base);
+    if (!decoded) return tl::unexpected(decoded.error());
+    out.decoded_base = std::move(*decoded);
+    SurfaceLevelsOptions levels;
+    levels.levels.depth = depth;
+    levels.levels.step = in_header(options.step.value * (1 << displacement_bits));
+    levels.levels.coarser = options.coarser;
+    levels.levels.rules.fill(options.rule);
+    levels.lambda = options.lambda;
+    levels.fit.least_moved = options.least_moved;
+    levels.fit.threads = options.threads;
+    auto encoded = encode_surface_levels(sampled, out.decoded_base, levels);
+    if (!encoded) return tl::unexpected(encoded.error());
+    out.levels = std::move(*encoded);
+    return out;
+}
+
+}  // namespace htvm::internal

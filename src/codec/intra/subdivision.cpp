@@ -1,0 +1,269 @@
+#include "codec/intra/subdivision.h"
+
+#include <algorithm>
+
+namespace htvm::internal {
+namespace {
+
+struct Side {
+    std::uint32_t low, high, corner;  // corner: three times the triangle and where in it the side begins
+};
+
+// Sides sorted by low, then high, then corner: a counting sort by each vertex, the minor one first.
+std::vector<Side> sorted_sides(std::size_t vertices, std::span<const Triangle> triangles) {
+    std::vector<Side> sides, sorted;
+    sides.reserve(3 * triangles.size());
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+        const auto& [a, b, c] = triangles[t];
+        if (a == b || b == c || a == c) continue;
+        for (std::uint32_t i = 0; i < 3; ++i) {
+            const std::uint32_t from = triangles[t][i], to = triangles[t][(i + 1) % 3];
+            sides.push_back({std::min(from, to), std::max(from, to), 3 * t + i});
+        }
+    }
+    sorted.resize(sides.size());
+    std::vector<std::uint32_t> first(vertices + 1);
+    for (const auto key : {&Side::high, &Side::low}) {
+        std::fill(first.begin(), first.end(), 0);
+        for (const auto& side : sides) ++first[side.*key + std::size_t{1}];
+        for (std::size_t v = 0; v < vertices; ++v) first[v + 1] += first[v];
+        for (const auto& side : sides) sorted[first[side.*key]++] = side;
+        sides.swap(sorted);
+    }
+    return sides;
+}
+
+std::uint32_t third_corner(const Triangle& triangle, std::uint32_t a, std::uint32_t b) {
+    for (const auto v : triangle)
+        if (v != a && v != b) return v;
+    return no_element;
+}
+
+// The two borders that meet at each vertex, as edges; no_element where more or fewer do.
+std::vector<std::array<std::uint32_t, 2>> borders_at(std::size_t vertices, const MeshEdges& edges) {
+    std::vector<std::array<std::uint32_t, 2>> out(vertices, {no_element, no_element});
+    std::vector<std::uint8_t> count(vertices, 0);
+    for (std::uint32_t e = 0; e < edges.size(); ++e) {
+        if (edges.sides[e] != 1) continue;
+        for (const auto v : edges.ends[e]) {
+            if (count[v] < 2) out[v][count[v]] = e;
+            count[v] = static_cast<std::uint8_t>(std::min(count[v] + 1, 3));
+        }
+    }
+    for (std::size_t v = 0; v < vertices; ++v)
+        if (count[v] != 2) out[v] = {no_element, no_element};
+    return out;
+}
+
+std::array<std::int64_t, 3> wide(LatticePoint p) { return {p.x, p.y, p.z}; }
+
+}  // namespace
+
+MeshEdges find_edges(std::size_t vertices, std::span<const Triangle> triangles) {
+    const auto sides = sorted_sides(vertices, triangles);
+    MeshEdges out;
+    out.of_triangle.assign(triangles.size(), {no_element, no_element, no_element});
+    // The first corner that names each side's edge.
+    std::vector<std::uint32_t> named_first(3 * triangles.size(), no_element);
+    for (std::size_t i = 0, begin = 0; i < sides.size(); ++i) {
+        if (sides[i].low != sides[begin].low || sides[i].high != sides[begin].high) begin = i;
+        named_first[sides[i].corner] = sides[begin].corner;
+    }
+    for (std::uint32_t corner = 0; corner < named_first.size(); ++corner) {
+        const auto first = named_first[corner];
+        if (first == no_element) continue;
+        const std::uint32_t t = corner / 3;
+        if (first == corner) {
+            const std::uint32_t from = triangles[t][corner % 3], to = triangles[t][(corner + 1) % 3];
+            out.of_triangle[t][corner % 3] = static_cast<std::uint32_t>(out.ends.size());
+            out.ends.push_back({std::min(from, to), std::max(from, to)});
+            out.triangles.push_back({t, no_element});
+            out.sides.push_back(1);
+            continue;
+        }
+        const auto e = out.of_triangle[t][corner % 3] = out.of_triangle[first / 3][first % 3];
+        if (++out.sides[e] == 2) out.triangles[e][1] = t;
+    }
+    return out;
+}
+
+std::vector<EdgeStencil> edge_stencils(std::size_t vertices, std::span<const Triangle> triangles,
+                                       const MeshEdges& edges, std::span<const std::uint32_t> wanted) {
+    const auto borders = borders_at(vertices, edges);
+    // The vertex behind a side of a triangle.
+    const auto behind = [&](std::uint32_t triangle, std::uint32_t from, std::uint32_t to) {
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto e = edges.of_triangle[triangle][i];
+            const auto& ends = edges.ends[e];
+            if (ends[0] != std::min(from, to) || ends[1] != std::max(from, to)) continue;
+            if (edges.sides[e] != 2) return no_element;
+            const auto other = edges.triangles[e][edges.triangles[e][0] == triangle ? 1 : 0];
+            return third_corner(triangles[other], from, to);
+        }
+        return no_element;
+    };
+    std::vector<EdgeStencil> out;
+    out.reserve(wanted.size());
+    for (const auto e : wanted) {
+        EdgeStencil s;
+        s.a = edges.ends[e][0];
+        s.b = edges.ends[e][1];
+        s.across = {no_element, no_element};
+        s.wings = {{{no_element, no_element}, {no_element, no_element}}};
+        s.along = {no_element, no_element};
+        if (edges.sides[e] == 2)
+            for (std::size_t k = 0; k < 2; ++k) {
+                const auto t = edges.triangles[e][k];
+                const auto c = s.across[k] = third_corner(triangles[t], s.a, s.b);
+                s.wings[k] = {behind(t, s.a, c), behind(t, s.b, c)};
+            }
+        if (edges.sides[e] == 1)
+            for (std::size_t k = 0; k < 2; ++k) {
+                const auto v = k == 0 ? s.a : s.b;
+                if (borders[v][0] == no_element) continue;
+                const auto& ends = edges.ends[borders[v][borders[v][0] == e ? 1 : 0]];
+                s.along[k] = ends[0] == v ? ends[1] : ends[0];
+            }
+        out.push_back(s);
+    }
+    return out;
+}
+
+std::array<std::int64_t, 3> butterfly_offset(std::span<const LatticePoint> positions, const EdgeStencil& stencil) {
+    const auto a = wide(positions[stencil.a]), b = wide(positions[stencil.b]);
+    std::array<std::int64_t, 3> out{};
+    if (stencil.across[0] == no_element) {
+        if (stencil.along[0] == no_element || stencil.along[1] == no_element) return out;
+        const auto before = wide(positions[stencil.along[0]]), behind = wide(positions[stencil.along[1]]);
+        for (std::size_t i = 0; i < 3; ++i) out[i] = a[i] + b[i] - before[i] - behind[i];
+        return out;
+    }
+    for (std::size_t k = 0; k < 2; ++k) {
+        const auto c = wide(positions[stencil.across[k]]);
+        for (std::size_t i = 0; i < 3; ++i) out[i] += 2 * c[i];
+        for (std::size_t end = 0; end < 2; ++end) {
+            const auto wing = stencil.wings[k][end];
+            if (wing != no_element) {
+                const auto w = wide(positions[wing]);
+                for (std::size_t i = 0; i < 3; ++i) out[i] -= w[i];
+                continue;
+            }
+            // Where nothing is behind, the triangle is continued as a parallelogram.
+            const auto &near = end == 0 ? a : b, &far = end == 0 ? b : a;
+            for (std::size_t i = 0; i < 3; ++i) out[i] -= near[i] + c[i] - far[i];
+        }
+    }
+    return out;
+}
+
+Vector3d tangents_offset(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
+                         const EdgeStencil& stencil) {
+    const Vector3d edge = to_vector(positions[stencil.b]) - to_vector(positions[stencil.a]);
+    const Vector3d &at_a = normals[stencil.a], &at_b = normals[stencil.b];
+    return (at_b * dot(edge, at_b) - at_a * dot(edge, at_a)) * 0.125;
+}
+
+Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
+                         const EdgeStencil& stencil, const SubdivisionRule& rule) {
+    Vector3d out = (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
+    if (rule.butterfly > 0) {
+        const auto offset = butterfly_offset(positions, stencil);
+        const double share = static_cast<double>(rule.butterfly) / 128;
+        for (std::size_t i = 0; i < 3; ++i) out[i] += static_cast<double>(offset[i]) * share;
+    }
+    if (rule.tangents > 0)
+        out = out + tangents_offset(positions, normals, stencil) * (static_cast<double>(rule.tangents) / 8);
+    return out;
+}
+
+std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
+                                      std::span<const std::uint32_t> vertex_of_edge, std::span<const Vector3d> places) {
+    std::vector<Triangle> out;
+    out.reserve(4 * triangles.size());
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        const auto& corners = triangles[t];
+        std::array<std::uint32_t, 3> middle{no_element, no_element, no_element};
+        std::size_t split = 0;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto e = edges.of_triangle[t][i];
+            if (e != no_element) middle[i] = vertex_of_edge[e];
+            split += middle[i] != no_element;
+        }
+        if (split == 0) {
+            out.push_back(corners);
+            continue;
+        }
+        // Turned so that the side that is split, or is not, where one is alone, is the first.
+        std::size_t k = 0;
+        while (split < 3 && (middle[k] != no_element) != (split == 1)) ++k;
+        const auto a = corners[k], b = corners[(k + 1) % 3], c = corners[(k + 2) % 3];
+        const auto ab = middle[k], bc = middle[(k + 1) % 3], ca = middle[(k + 2) % 3];
+        if (split == 1) {
+            out.push_back({a, ab, c});
+            out.push_back({ab, b, c});
+        } else if (split == 2) {
+            const Vector3d from_a = places[bc] - places[a], from_b = places[ca] - places[b];
+            if (dot(from_a, from_a) <= dot(from_b, from_b)) {
+                out.push_back({a, b, bc});
+                out.push_back({a, bc, ca});
+            } else {
+                out.push_back({a, b, ca});
+                out.push_back({b, bc, ca});
+            }
+            out.push_back({ca, bc, c});
+        } else {
+            out.push_back({a, ab, ca});
+            out.push_back({ab, b, bc});
+            out.push_back({ca, bc, c});
+            out.push_back({ab, bc, ca});
+        }
+    }
+    return out;
+}
+
+std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
+                                                       std::size_t most_vertices) {
+    std::vector<SubdivisionLevel> out;
+    // Where vertices lie on the base: halves of integers at most most_levels times, so exact.
+    std::vector<Vector3d> flat;
+    for (const auto p : base.positions) flat.push_back(to_vector(p));
+    std::vector<std::uint32_t> split, vertex_of_edge;
+    for (std::uint32_t k = 1; k <= depth.levels; ++k) {
+        const std::span<const Triangle> triangles = out.empty() ? base.triangles : out.back().triangles;
+        SubdivisionLevel level;
+        level.first = static_cast<std::uint32_t>(flat.size());
+        const auto edges = find_edges(flat.size(), triangles);
+        const double longest = static_cast<double>(std::int64_t{depth.longest_edge} << (depth.levels - k));
+        split.clear();
+        vertex_of_edge.assign(edges.size(), no_element);
+        for (std::uint32_t e = 0; e < edges.size(); ++e) {
+            const Vector3d side = flat[edges.ends[e][1]] - flat[edges.ends[e][0]];
+            if (!(dot(side, side) > longest * longest)) continue;
+            vertex_of_edge[e] = static_cast<std::uint32_t>(level.first + split.size());
+            split.push_back(e);
+        }
+        if (split.size() > most_vertices - std::min<std::size_t>(level.first, most_vertices)) return std::nullopt;
+        // Triangles may lie on each other, and grow though vertices do not.
+        std::size_t cut = triangles.size();
+        for (std::uint32_t e = 0; e < edges.size(); ++e)
+            if (vertex_of_edge[e] != no_element) cut += edges.sides[e];
+        if (cut > 4 * most_vertices) return std::nullopt;
+        level.stencils = edge_stencils(flat.size(), triangles, edges, split);
+        for (const auto own : split) {
+            std::array<std::uint32_t, 4> beside{no_element, no_element, no_element, no_element};
+            std::size_t count = 0;
+            for (const auto t : edges.triangles[own]) {
+                if (t == no_element) continue;
+                for (const auto e : edges.of_triangle[t])
+                    if (e < own && vertex_of_edge[e] != no_element) beside[count++] = vertex_of_edge[e];
+            }
+            level.beside.push_back(beside);
+        }
+        for (const auto e : split) flat.push_back((flat[edges.ends[e][0]] + flat[edges.ends[e][1]]) * 0.5);
+        level.triangles = split_triangles(triangles, edges, vertex_of_edge, flat);
+        out.push_back(std::move(level));
+    }
+    return out;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,122 @@
+#include "codec/intra/surface_levels.h"
+
+#include "codec/intra/surface_levels_walk.h"
+#include "entropy/range_coder.h"
+
+namespace htvm::internal {
+namespace {
+
+// The class of a magnitude or of a sum of some, growing with its logarithm.
+std::size_t magnitude_class(std::uint64_t quarters, std::size_t classes) {
+    constexpr std::array<std::uint32_t, 8> above = {0, 2, 4, 7, 11, 18, 32, 60};
+    std::size_t out = 0;
+    for (const auto threshold : above) out += quarters > threshold;
+    return std::min(out, classes - 1);
+}
+
+std::size_t bend_class(double squared, std::uint32_t step) {
+    // In eighths of the step, squared: classes are a factor of two apart, without a root.
+    const double unit = static_cast<double>(step) / (8 << displacement_bits);
+    const double in_eighths = squared / (unit * unit);
+    std::size_t out = 0;
+    for (double limit = 1; out + 1 < DisplacementContext::bends && in_eighths >= limit; limit *= 4) ++out;
+    return out;
+}
+
+}  // namespace
+
+std::uint32_t step_at(const SurfaceLevels& levels, std::uint32_t level) {
+    std::uint32_t step = levels.step;
+    for (std::uint32_t k = levels.depth.levels; k > level; --k) step = (step * levels.coarser + 8) / 16;
+    return std::max(step, 1u);
+}
+
+LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, std::int32_t value,
+                              std::uint32_t step) {
+    const double distance = static_cast<double>(value) * static_cast<double>(step) / (1 << displacement_bits);
+    // To the nearest, halves up: cutting off rounds down once what is below zero is corrected.
+    const auto along = [&](std::size_t i) {
+        const double moved = expected[i] + normal[i] * distance + 0.5;
+        const auto whole = static_cast<std::int64_t>(moved);
+        return within_lattice(whole - (moved < static_cast<double>(whole)));
+    };
+    return {along(0), along(1), along(2)};
+}
+
+ExpectedLevel expected_base(const LatticeMesh& base) {
+    ExpectedLevel out;
+    for (const auto p : base.positions) out.at.push_back(to_vector(p));
+    out.normal = vertex_normals(base.positions, base.triangles);
+    out.bent.assign(out.at.size(), 0);
+    return out;
+}
+
+ExpectedLevel expected_level(const SubdivisionLevel& level, std::span<const LatticePoint> positions,
+                             std::span<const Triangle> triangles, const SubdivisionRule& rule) {
+    ExpectedLevel out;
+    out.above = vertex_normals(positions, triangles);
+    const auto& normals = out.above;
+    for (const auto& stencil : level.stencils) {
+        out.at.push_back(expected_vertex(positions, normals, stencil, rule));
+        out.normal.push_back(normalised(normals[stencil.a] + normals[stencil.b]));
+        const Vector3d off = out.at.back() - (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
+        out.bent.push_back(dot(off, off));
+    }
+    return out;
+}
+
+DisplacementContext displacement_context(const SubdivisionLevel& level, std::size_t i, std::uint32_t number,
+                                         std::span<const std::int32_t> values, double bent, std::uint32_t step) {
+    DisplacementContext out;
+    out.level = std::min<std::size_t>(number, DisplacementContext::levels - 1);
+    const auto magnitude = [&](std::uint32_t v) {
+        return static_cast<std::uint64_t>(std::min(std::abs(values[v]), 64));
+    };
+    const auto& stencil = level.stencils[i];
+    std::uint64_t above = 2 * (magnitude(stencil.a) + magnitude(stencil.b));
+    for (const auto v : stencil.across)
+        if (v != no_element) above += magnitude(v);
+    out.above = magnitude_class(above, DisplacementContext::aboves);
+    std::uint64_t sum = 0;
+    std::int64_t signed_sum = 0, count = 0;
+    for (const auto v : level.beside[i]) {
+        if (v == no_element) break;
+        ++count;
+        sum += magnitude(v);
+        signed_sum += std::clamp(values[v], -64, 64);
+    }
+    if (count > 0) {
+        out.beside = 1 + magnitude_class(4 * sum / static_cast<std::uint64_t>(count), DisplacementContext::besides - 1);
+        const std::int64_t mean = 2 * signed_sum / count;
+        const std::int64_t size = mean == 0 ? 0 : std::abs(mean) < 2 ? 1 : std::abs(mean) < 5 ? 2 : 3;
+        out.trend = static_cast<std::size_t>(3 + (mean < 0 ? -size : size));
+    }
+    out.bend = bend_class(bent, step);
+    return out;
+}
+
+Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> run, const LatticeMesh& base,
+                                             std::size_t most_vertices) {
+    RangeDecoder decoder(run);
+    ReadingCoder<RangeDecoder> coder{decoder};
+    const auto levels = code_levels_header(coder, {});
+    auto subdivision = subdivide(base, levels.depth, most_vertices);
+    if (!subdivision) return fail(ErrorKind::limit, "surface levels: more vertices than may be decoded");
+    LeveledSurface out;
+    std::vector<std::int32_t> values;
+    DisplacementModels models;
+    const auto nothing = [](std::size_t, const DisplacementContext&) { return 0; };
+    code_displacements(coder, models, nullptr, 0, expected_base(base), step_at(levels, 0), out.positions, values,
+                       nothing);
+    out.triangles = base.triangles;
+    for (std::uint32_t k = 1; k <= levels.depth.levels && !decoder.exhausted(); ++k) {
+        auto& level = (*subdivision)[k - 1];
+        const auto expected = expected_level(level, out.positions, out.triangles, levels.rules[k - 1]);
+        code_displacements(coder, models, &level, k, expected, step_at(levels, k), out.positions, values, nothing);
+        out.triangles = std::move(level.triangles);
+    }
+    if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "surface levels: the run ends too early");
+    return out;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,138 @@
+// What encoder and decoder of surface levels share: the walk from the base to the finest level, what each vertex is
+// expected to be, and the contexts of its displacement.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "codec/intra/surface_levels.h"
+#include "entropy/mixing.h"
+#include "entropy/models.h"
+
+namespace htvm::internal {
+
+// What is known round a displacement before it is coded, as classes.
+struct DisplacementContext {
+    static constexpr std::size_t levels = 6, besides = 10, aboves = 10, bends = 8, trends = 7;
+    std::size_t level = 0;
+    std::size_t beside = 0;  // how large those of the same level are in the triangles beside its edge; 0: none is known
+    std::size_t above = 0;   // how large those of its edge's ends are, and of the corners across it
+    std::size_t bend = 0;    // how far off its edge's middle it is expected, over the step
+    std::size_t trend = 3;   // which way those beside it go, 3: neither
+};
+
+struct DisplacementModels {
+    template <std::size_t N>
+    using Models = std::array<BinaryModel, N>;
+    using C = DisplacementContext;
+
+    // Whether other than zero.
+    Models<C::levels * C::besides> by_beside{};
+    Models<C::levels * C::aboves> by_above{};
+    Models<C::besides * C::aboves> by_both{};
+    Models<C::levels * C::bends> by_bend{};
+    Models<C::trends * C::bends> by_trend{};
+    std::array<Mixer<5>, C::levels> nonzero_mixer{};
+    // Whether negative.
+    Models<C::trends * C::levels> sign_by_trend{};
+    Models<C::levels * C::bends> sign_by_bend{};
+    std::array<Mixer<2>, C::levels> sign_mixer{};
+    // The magnitude less one: in unary, from `unary` on as an exponential Golomb code.
+    static constexpr std::size_t unary = 14;
+    std::array<Models<unary>, C::levels * C::besides> more_by_beside{};
+    std::array<Models<unary>, C::levels * C::aboves> more_by_above{};
+    std::array<Models<unary>, C::levels * C::bends> more_by_bend{};
+    std::array<Mixer<3>, unary> more_mixer{};
+    Models<32> top{};
+};
+
+inline constexpr std::int32_t most_displacement = 1 << 20;  // of a quantised one's magnitude
+
+// Codes a quantised displacement. Coder: as the coders of entropy/models.h, also with a cost counter behind it.
+template <class Coder>
+std::int32_t code_displacement(Coder& coder, DisplacementModels& m, const DisplacementContext& c, std::int32_t wanted) {
+    using C = DisplacementContext;
+    const auto at_level = [&](std::size_t classes, std::size_t own) { return c.level * classes + own; };
+    const std::array<BinaryModel*, 5> nonzero = {
+        &m.by_beside[at_level(C::besides, c.beside)], &m.by_above[at_level(C::aboves, c.above)],
+        &m.by_both[c.beside * C::aboves + c.above], &m.by_bend[at_level(C::bends, c.bend)],
+        &m.by_trend[c.trend * C::bends + c.bend]};
+    if (!code_mixed(coder, m.nonzero_mixer[c.level], nonzero, wanted != 0)) return 0;
+    const std::array<BinaryModel*, 2> signs = {&m.sign_by_trend[c.level * C::trends + c.trend],
+                                               &m.sign_by_bend[at_level(C::bends, c.bend)]};
+    const bool negative = code_mixed(coder, m.sign_mixer[c.level], signs, wanted < 0);
+    const auto rest = static_cast<std::uint32_t>(std::max(std::abs(wanted), 1) - 1);
+    std::uint32_t coded = 0;
+    while (coded < DisplacementModels::unary) {
+        const std::array<BinaryModel*, 3> more = {&m.more_by_beside[at_level(C::besides, c.beside)][coded],
+                                                  &m.more_by_above[at_level(C::aboves, c.above)][coded],
+                                                  &m.more_by_bend[at_level(C::bends, c.bend)][coded]};
+        if (!code_mixed(coder, m.more_mixer[coded], more, rest > coded)) break;
+        ++coded;
+    }
+    if (coded == DisplacementModels::unary) {
+        const std::uint32_t left = std::max(rest, coded) - coded + 1;
+        const int width = static_cast<int>(std::bit_width(left)) - 1;
+        int top = 0;
+        while (top < 20 && coder.bit(m.top[static_cast<std::size_t>(top)], top < width)) ++top;
+        const std::uint32_t low = coder.raw(left & ((1u << top) - 1), top);
+        coded += ((1u << top) | low) - 1;
+    }
+    const auto magnitude =
+        static_cast<std::int32_t>(std::min(coded, static_cast<std::uint32_t>(most_displacement) - 1)) + 1;
+    return negative ? -magnitude : magnitude;
+}
+
+// Codes the header's numbers.
+template <class Coder>
+SurfaceLevels code_levels_header(Coder& coder, const SurfaceLevels& wanted) {
+    SurfaceLevels out;
+    out.depth.levels = std::min(coder.raw(wanted.depth.levels, 4), most_levels);
+    out.depth.longest_edge = coder.raw(wanted.depth.longest_edge - 1, 20) + 1;
+    out.step = coder.raw(wanted.step - 1, 20) + 1;
+    out.coarser = coder.raw(wanted.coarser - 1, 4) + 1;
+    for (std::uint32_t k = 0; k < out.depth.levels; ++k) {
+        out.rules[k].butterfly = coder.raw(wanted.rules[k].butterfly, 4);
+        out.rules[k].tangents = coder.raw(wanted.rules[k].tangents, 4);
+    }
+    return out;
+}
+
+// The vertices of a level before they are moved. Of the base, where it has them.
+struct ExpectedLevel {
+    std::vector<Vector3d> at, normal;
+    std::vector<double> bent;     // squared, how far off the middle of its edge each is expected; 0 for the base
+    std::vector<Vector3d> above;  // the normals of all vertices of the levels above
+};
+ExpectedLevel expected_base(const LatticeMesh& base);
+// positions: of the levels above. triangles: of the level above.
+ExpectedLevel expected_level(const SubdivisionLevel& level, std::span<const LatticePoint> positions,
+                             std::span<const Triangle> triangles, const SubdivisionRule& rule);
+
+// The context of vertex i of a level. values: quantised displacements of the vertices before it; those of the base
+// count as zero, since what a coarse base leaves says nothing of what is below.
+DisplacementContext displacement_context(const SubdivisionLevel& level, std::size_t i, std::uint32_t number,
+                                         std::span<const std::int32_t> values, double bent, std::uint32_t step);
+
+// Codes the displacements of a level, whose number is 0 for the base, and moves its vertices. The vectors end where it
+// begins. level: null for the base. choose(i, context) gives the value that is wanted; decoding, anything.
+template <class Coder, class Choose>
+void code_displacements(Coder& coder, DisplacementModels& models, const SubdivisionLevel* level, std::uint32_t number,
+                        const ExpectedLevel& expected, std::uint32_t step, std::vector<LatticePoint>& positions,
+                        std::vector<std::int32_t>& values, const Choose& choose) {
+    for (std::size_t i = 0; i < expected.at.size(); ++i) {
+        const auto context =
+            level ? displacement_context(*level, i, number, values, expected.bent[i], step) : DisplacementContext{};
+        const auto value = code_displacement(coder, models, context, choose(i, context));
+        values.push_back(level ? value : 0);
+        positions.push_back(displaced_vertex(expected.at[i], expected.normal[i], value, step));
+    }
+}
+
+}  // namespace htvm::internal
