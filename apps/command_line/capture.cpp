@@ -255,7 +255,7 @@ std::int64_t Capture::regular_time(std::uint64_t place) const {
     return std::llround(static_cast<double>(place) / fps() * 1e6);
 }
 
-// Of --timestamps.
+// Reads what --timestamps names.
 Result<void> Capture::find_listed_times() {
     auto listed = read_frame_times(options_.timestamps, options_.fps);
     if (!listed) return tl::unexpected(listed.error());
@@ -541,7 +541,7 @@ void Capture::tell(const std::vector<MeshRemark>& remarks, const std::string& na
     }
 }
 
-// Of --up: which axis it is, and where the first mesh ends on it.
+// Finds which axis --up names, and where the first mesh ends on it.
 void Capture::find_floor() {
     up_ = options_.up;
     if (up_ == UpAxis::unknown) return;

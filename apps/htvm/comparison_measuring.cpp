@@ -76,7 +76,7 @@ Result<TrueMeshes> open_truth(const ComparisonRequest& options, const char* name
     return out;
 }
 
-// Of the original at this position.
+// The truth of the original at this position.
 Result<Mesh> true_mesh(TrueMeshes& truth, const MeshSource& original, std::size_t position) {
     if (truth.place_of[position] == truth.source.frames)
         return fail(ErrorKind::bad_input,

@@ -277,7 +277,7 @@ std::string frames_text(std::uint32_t first, std::uint32_t count) {
     return count == 1 ? fmt::format("frame {}", first) : fmt::format("frames {} to {}", first, first + (count - 1));
 }
 
-// Of `count` frames: what stands in for those that are concealed.
+// What stands in for those of `count` frames that are concealed.
 std::string stand_in_text(std::uint32_t concealed, std::uint32_t count) {
     if (concealed == 0) return {};
     const std::string whom = concealed < count ? fmt::format("{} of them", concealed) : count == 1 ? "it" : "them";

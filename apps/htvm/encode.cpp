@@ -289,7 +289,7 @@ Result<void> encode_in_groups(const EncodePlan& plan, Capture& capture, const En
     return {};
 }
 
-// Of --repeat-efforts; nothing without it.
+// The log that --repeat-efforts names; nothing without it.
 Result<std::optional<EffortLog>> efforts_to_repeat(const EncodePlan& plan, const Capture& capture) {
     if (plan.repeat_efforts.empty()) return std::nullopt;
     auto log = read_effort_log(plan.repeat_efforts);

@@ -41,7 +41,7 @@ struct Point {
     std::string setting;
     std::size_t bytes = 0, vertices = 0;
     SurfaceError error;
-    // Of a base with levels:
+    // Where there is a base with levels:
     std::size_t base_vertices = 0, connectivity = 0, base_positions = 0;
     std::vector<EncodedSurfaceLevels::Part> parts = {};
 };

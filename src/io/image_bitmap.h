@@ -11,7 +11,7 @@
 namespace htvm::internal {
 
 bool is_bmp(std::span<const std::uint8_t> bytes);
-// Of 1, 4, 8, 16, 24 and 32 bits a pixel, with palettes, masks or runs of 4 and 8 bits, from either edge.
+// Reads 1, 4, 8, 16, 24 and 32 bits a pixel, with palettes, masks or runs of 4 and 8 bits, from either edge.
 Result<Image> read_bmp_image(std::span<const std::uint8_t> bytes, int largest_side);
 
 // By the mark at its end, or, as older files have none, by a header in which everything is possible.

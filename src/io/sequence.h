@@ -39,8 +39,8 @@ struct SequenceOptions {
 // - a name with one %d or %05d in its last part: the existing files of that name with any number, however many zeros
 //   are in front, by ascending number; the first need not be 0 and numbers may be missing;
 // - a name with * (any characters) or ? (one character) in its last part: the mesh files that match, as of a folder.
-// Of a folder and a glob copies of other files in it, and files that programs have not finished, are left out, with a
-// remark. Fails (bad_input) if nothing is found, with what was looked for and what is there instead; and, naming the
+// Copies of other files in a folder or glob, and files that programs have not finished, are left out, with a remark.
+// Fails (bad_input) if nothing is found, with what was looked for and what is there instead; and, naming the
 // files, if they are more than a sequence of frames: of different formats (whatever the case of their endings), since
 // then each frame is most likely there twice; of several captures; with meshes that do not belong to the frames; with
 // a number twice. Names of which most are not numbered alike are taken in natural order, with a remark.

@@ -29,7 +29,7 @@ struct WordReader {
     Commas commas = Commas::letters;
 
     void step() {
-        // Of \r\n the \n counts.
+        // The \n of \r\n counts.
         const bool ends_line = text[position] == '\n' ||
                                (text[position] == '\r' && (position + 1 == text.size() || text[position + 1] != '\n'));
         line += ends_line;

@@ -44,7 +44,7 @@ struct Neighbours {
     std::uint32_t first, second;
 };
 
-// Of an edge of many triangles, each with the next: enough to hang them together.
+// Pairs of triangles at an edge; of many at one edge, each with the next, which hangs them together.
 std::vector<Neighbours> neighbours_in(const Mesh& mesh) {
     struct Side {
         std::uint32_t low, high, triangle;
@@ -68,7 +68,7 @@ std::vector<Neighbours> neighbours_in(const Mesh& mesh) {
     return out;
 }
 
-// Of every triangle: that of the patch that it belongs to.
+// Each triangle has the verdict of the patch that it belongs to.
 std::vector<Verdict> verdicts(const Mesh& mesh, const std::vector<Middle>& middle) {
     struct Rim {
         std::size_t sides = 0, ending = 0;

@@ -21,7 +21,7 @@ struct SimplificationOptions {
     double colour_error = 12;  // the same for the colours it stands for, in levels
     double longest_edge = 0;   // no collapse makes an edge longer than this; 0: no limit
     bool keep_tips = true;     // a vertex at a border that has one triangle keeps it, else goes with it where it does
-    // Of each vertex how many times smaller its error must be, and that of what it is merged with; none: all once.
+    // How many times smaller each vertex's error must be, and that of what it is merged with; none: all once.
     std::span<const float> finer = {};
     Threads threads = {};
 };

@@ -104,7 +104,7 @@ SurfaceLevels code_levels_header(Coder& coder, const SurfaceLevels& wanted) {
     return out;
 }
 
-// The vertices of a level before they are moved. Of the base, where it has them.
+// The vertices of a level before they are moved; of the base, where it has them.
 struct ExpectedLevel {
     std::vector<Vector3d> at, normal;
     std::vector<double> bent;     // squared, how far off the middle of its edge each is expected; 0 for the base

@@ -39,7 +39,8 @@ Result<Presence> read_presence_layer(std::span<const std::uint8_t> layer, std::s
 // What is known of a frame's vertices from the two that it lies between. later: none: all of them are there.
 Presence presence_between(std::span<const std::uint8_t> earlier, std::span<const std::uint8_t> later);
 
-// Of a patched mesh: what stays is there as it was, what is new is there. presence: of the mesh before, or none.
+// The presence of a patched mesh: what stays is there as it was, what is new is there. presence: of the mesh before, or
+// none.
 Presence presence_of_patched(std::span<const std::uint8_t> presence, std::span<const std::uint32_t> stays,
                              std::size_t vertices);
 

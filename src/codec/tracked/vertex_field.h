@@ -37,7 +37,7 @@ struct FieldOptions {
     double lambda = 0.12;
     // Code sum, and two differences, of three components that resemble each other: red, green and blue.
     bool turned = false;
-    // Of each vertex whether its value counts, or 0; none: all do. The others take what is predicted, and cost nothing.
+    // Says of each vertex whether its value counts; none: all do. The others take what is predicted, and cost nothing.
     std::span<const std::uint8_t> counts = {};
     double first_weight = 1;  // of a turned field: the sum's step is step[0] / first_weight
 };

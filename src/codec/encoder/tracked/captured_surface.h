@@ -32,8 +32,8 @@ struct MovedReference {
 
 struct TrackedTargets {
     std::vector<std::uint32_t> near;  // of each vertex, the captured vertex beside it, or OrientedPoints::no_point
-    // Of each vertex whether it lies beside captured surface, not beyond a border of it: 1, or 2 if that is too far off
-    // for it to be shown; none where the surface's borders are not known.
+    // Says of each vertex whether it lies beside captured surface, not beyond a border of it: 1, or 2 if that is too
+    // far off for it to be shown; none where the surface's borders are not known.
     std::vector<std::uint8_t> seen;
     std::vector<std::int32_t> displacement;  // one per vertex, in lattice units along its normal
     std::vector<std::int32_t> colours;       // three per vertex, levels to add; empty if the reference has no colours
@@ -77,7 +77,7 @@ struct TrackedFit {
     double stray_share = 0;       // share of the samples that are farther than `stray`
     LatticeUnits worst_region;    // the RMS distance in the worst cube of space
     std::vector<double> squared;  // squared distances of the decoded mesh's samples from the captured surface
-    // Of surface that comes and goes, which counts as uncovered, not as far off, where nothing is tracked beside it:
+    // Where surface comes and goes, what nothing is tracked beside counts as uncovered, not as far off:
     double uncovered_share = 0;     // of the captured samples
     LatticeUnits widest_uncovered;  // side of a square as large as what is uncovered in one cube
 };
