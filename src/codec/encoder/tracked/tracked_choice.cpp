@@ -162,7 +162,10 @@ Growth growth_due(const TrackedWork& work, const TrackedFit& fit, const VainAtte
     const auto wide = fit.widest_uncovered;
     if (fit.uncovered_share > numbers.much_uncovered || wide > scale.on_lattice(numbers.grown_at_once))
         return Growth::now;
-    return since >= numbers.grown_after && wide > scale.on_lattice(numbers.grown_from) ? Growth::next : Growth::none;
+    // Rims that are worn off bit by bit, here and there, are never wide.
+    const bool worn = since >= numbers.worn_after && fit.uncovered_share > numbers.worn_off;
+    const bool wide_enough = since >= numbers.grown_after && wide > scale.on_lattice(numbers.grown_from);
+    return worn || wide_enough ? Growth::next : Growth::none;
 }
 
 // ---- The steps of a choice ------------------------------------------------------------------------------------------
