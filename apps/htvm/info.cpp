@@ -512,7 +512,10 @@ void add_info(CLI::App& app, Run& run) {
         ->check(CLI::Range(0.01, 3600.0))
         ->needs(bitrate);
     command->footer(
-        "Columns: ref is the frame that it refers to; pose is the skeleton (I), transforms are the bones' (EP) or the\n"
+        "Columns: ref is the frame that it refers to; vertices are the decoded mesh's, where surface comes and goes "
+        "with\n"
+        "those that are not there, triangles are those shown; pose is the skeleton (I), transforms are the bones' (EP) "
+        "or the\n"
         "nodes' (T); fans and distance order are the connectivity's two parts; texcoords are texture coordinates; of\n"
         "TP-frames tracked is what a T-frame has too, in one, removed what the patch replaces, border where it joins,\n"
         "and the other columns are the patch's; bpv is the frame's total, with packet and layer headers, counts and\n"
