@@ -20,7 +20,7 @@ struct SurfaceLevelsOptions {
 };
 
 struct EncodedSurfaceLevels {
-    std::vector<std::uint8_t> run;
+    std::vector<std::uint8_t> payload;
     LeveledSurface surface;  // that the decoder will have
     struct Part {
         std::size_t vertices = 0, moved = 0;  // and how many of them are displaced

@@ -89,20 +89,9 @@ std::int32_t code_displacement(Coder& coder, DisplacementModels& m, const Displa
     return negative ? -magnitude : magnitude;
 }
 
-// Codes the header's numbers.
-template <class Coder>
-SurfaceLevels code_levels_header(Coder& coder, const SurfaceLevels& wanted) {
-    SurfaceLevels out;
-    out.depth.levels = std::min(coder.raw(wanted.depth.levels, 4), most_levels);
-    out.depth.longest_edge = coder.raw(wanted.depth.longest_edge - 1, 20) + 1;
-    out.step = coder.raw(wanted.step - 1, 20) + 1;
-    out.coarser = coder.raw(wanted.coarser - 1, 4) + 1;
-    for (std::uint32_t k = 0; k < out.depth.levels; ++k) {
-        out.rules[k].butterfly = coder.raw(wanted.rules[k].butterfly, 4);
-        out.rules[k].tangents = coder.raw(wanted.rules[k].tangents, 4);
-    }
-    return out;
-}
+// The payload of these runs, of the base's displacements first.
+std::vector<std::uint8_t> write_surface_levels(const SurfaceLevels& levels,
+                                               std::span<const std::vector<std::uint8_t>> runs);
 
 // The vertices of a level before they are moved. Of the base, where it has them.
 struct ExpectedLevel {
