@@ -34,8 +34,8 @@ RandomPayload random_payload(const LatticeMesh& base, const SurfaceLevels& level
     for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) {
         const auto* level = k > 0 ? &(*subdivision)[k - 1] : nullptr;
         const auto expected =
-            level ? expected_level(*level, out.surface.positions, out.surface.triangles, levels.rules[k - 1])
-                  : expected_base(base);
+            level ? ExpectedLevel(*level, out.surface.positions, out.surface.triangles, levels.rules[k - 1])
+                  : ExpectedLevel(base);
         RangeEncoder encoder;
         WritingCoder<RangeEncoder> coder{encoder};
         code_displacements(coder, models, level, k, expected, step_at(levels, k), out.surface.positions, values,

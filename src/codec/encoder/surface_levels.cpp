@@ -79,7 +79,7 @@ Result<EncodedSurfaceLevels> encode_surface_levels(const SurfaceIndex& captured,
         const auto* level = k > 0 ? &subdivision[k - 1] : nullptr;
         const auto& above = k > 1 ? subdivision[k - 2].triangles : base.triangles;
         const auto expected =
-            level ? expected_level(*level, positions, above, levels.rules[k - 1]) : expected_base(base);
+            level ? ExpectedLevel(*level, positions, above, levels.rules[k - 1]) : ExpectedLevel(base);
         const std::size_t first = positions.size();
         const auto step = step_at(levels, k);
         const double in_steps = (1 << displacement_bits) / static_cast<double>(step);

@@ -61,10 +61,11 @@ void SurfaceFit::rebuild() {
     farthest_.assign(displacements_.size(), 0);
     const std::vector<Triangle>* triangles = &base_.triangles;
     for (std::size_t k = 0; k <= subdivision_.size(); ++k) {
-        auto expected = k == 0 ? expected_base(base_)
-                               : expected_level(subdivision_[k - 1], positions_, *triangles, levels_.rules[k - 1]);
-        for (std::size_t i = 0; i < expected.at.size(); ++i) {
-            const Vector3d at = expected.at[i] + expected.normal[i] * displacements_[positions_.size()];
+        const auto expected = k == 0 ? ExpectedLevel(base_)
+                                     : ExpectedLevel(subdivision_[k - 1], positions_, *triangles, levels_.rules[k - 1]);
+        for (std::size_t i = 0; i < expected.size(); ++i) {
+            normals_.push_back(expected.normal(i));
+            const Vector3d at = expected.vertex(i).at + normals_.back() * displacements_[positions_.size()];
             positions_.push_back({within_lattice(std::llround(at[0])), within_lattice(std::llround(at[1])),
                                   within_lattice(std::llround(at[2]))});
         }
@@ -79,14 +80,13 @@ void SurfaceFit::rebuild() {
                     farthest_[v] = options_.farthest * sum / static_cast<double>(around.of(v).size());
             }
         } else {
-            for (std::size_t i = 0; i < expected.at.size(); ++i) {
+            for (std::size_t i = 0; i < expected.size(); ++i) {
                 const auto& stencil = subdivision_[k - 1].stencils[i];
                 farthest_[subdivision_[k - 1].first + i] =
                     options_.farthest * length(to_vector(positions_[stencil.b]) - to_vector(positions_[stencil.a]));
             }
         }
-        normals_.insert(normals_.end(), expected.normal.begin(), expected.normal.end());
-        above_.push_back(std::move(expected.above));
+        above_.push_back(expected.normals_above());
         if (k > 0) triangles = &subdivision_[k - 1].triangles;
     }
 }

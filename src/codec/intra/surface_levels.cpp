@@ -47,28 +47,6 @@ LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, 
     return {along(0), along(1), along(2)};
 }
 
-ExpectedLevel expected_base(const LatticeMesh& base) {
-    ExpectedLevel out;
-    for (const auto p : base.positions) out.at.push_back(to_vector(p));
-    out.normal = vertex_normals(base.positions, base.triangles);
-    out.bent.assign(out.at.size(), 0);
-    return out;
-}
-
-ExpectedLevel expected_level(const SubdivisionLevel& level, std::span<const LatticePoint> positions,
-                             std::span<const Triangle> triangles, const SubdivisionRule& rule) {
-    ExpectedLevel out;
-    out.above = vertex_normals(positions, triangles);
-    const auto& normals = out.above;
-    for (const auto& stencil : level.stencils) {
-        out.at.push_back(expected_vertex(positions, normals, stencil, rule));
-        out.normal.push_back(normalised(normals[stencil.a] + normals[stencil.b]));
-        const Vector3d off = out.at.back() - (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
-        out.bent.push_back(dot(off, off));
-    }
-    return out;
-}
-
 DisplacementContext displacement_context(const SubdivisionLevel& level, std::size_t i, std::uint32_t number,
                                          std::span<const std::int32_t> values, double bent, std::uint32_t step) {
     DisplacementContext out;
@@ -161,7 +139,7 @@ Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> paylo
         ReadingCoder<RangeDecoder> coder{decoder};
         auto* level = k > 0 ? &(*subdivision)[k - 1] : nullptr;
         const auto expected =
-            level ? expected_level(*level, out.positions, out.triangles, levels.rules[k - 1]) : expected_base(base);
+            level ? ExpectedLevel(*level, out.positions, out.triangles, levels.rules[k - 1]) : ExpectedLevel(base);
         code_displacements(coder, models, level, k, expected, step_at(levels, k), out.positions, values,
                            [](std::size_t, const DisplacementContext&) { return 0; });
         out.triangles = level ? std::move(level->triangles) : base.triangles;
