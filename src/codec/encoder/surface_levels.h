@@ -15,7 +15,7 @@ namespace htvm::internal {
 struct SurfaceLevelsOptions {
     SurfaceLevels levels;
     double lambda = 0.06;  // squared steps that a bit must spare
-    int rounds = 5;        // of the fit, before the first level is coded
+    int rounds = 4;        // of the fit, before the first level is coded
     SurfaceFitOptions fit;
 };
 
