@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "codec/encoder/leveled_intra.h"
 #include "codec/format/sequence.h"
+#include "codec/intra/intra_frame.h"
 #include "coders.h"
 #include "command_line/capture.h"
 #include "command_line/terminal.h"
@@ -24,6 +26,8 @@ namespace htvm::lab {
 using namespace app;
 using namespace internal;
 namespace {
+
+constexpr std::size_t layer_overhead = 3;  // the layer's number and length
 
 struct Options {
     CaptureOptions capture;
@@ -44,7 +48,39 @@ struct Point {
     // Where there is a base with levels:
     std::size_t base_vertices = 0, connectivity = 0, base_positions = 0;
     std::vector<EncodedSurfaceLevels::Part> parts = {};
+    double encode_ms = 0;
+    // Of what shows the base's displacements, then of what shows each level as well.
+    struct Shown {
+        std::size_t bytes = 0;
+        double decode_ms = 0;  // the median
+    };
+    std::vector<Shown> shown = {};
 };
+
+// The processor's time, which others on the machine do not change; all here runs on one thread.
+double milliseconds_since(std::clock_t begin) {
+    return 1000 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+}
+
+// What it takes to show the first levels: of the I-frame's payload with the base, and of the runs of these levels.
+Result<Point::Shown> shown_down_to(const LeveledIntra& coded, std::uint32_t level) {
+    constexpr std::size_t times = 31;
+    const auto header = read_levels_header(coded.levels.payload);
+    if (!header) return tl::unexpected(header.error());
+    const auto runs = std::span(coded.levels.payload).first(header->ends[level]);
+    std::vector<double> taken;
+    for (std::size_t i = 0; i < times; ++i) {
+        const auto begin = std::clock();
+        const auto base = decode_intra_frame(view_of(coded.base), nullptr);
+        if (!base) return tl::unexpected(base.error());
+        const auto surface = decode_surface_levels(runs, *base, coded.levels.surface.positions.size(), level);
+        if (!surface) return tl::unexpected(surface.error());
+        taken.push_back(milliseconds_since(begin));
+    }
+    std::nth_element(taken.begin(), taken.begin() + times / 2, taken.end());
+    return Point::Shown{write_frame_payload(coded.base).size() + layer_overhead + runs.size() + packet_overhead,
+                        taken[times / 2]};
+}
 
 Result<Point> measured(Point point, const Mesh& captured, const Mesh& shown, const Options& options) {
     SurfaceErrorOptions how;
@@ -80,22 +116,29 @@ Result<Point> leveled_point(const Mesh& mesh, double step, const Options& option
     if (!captured) return tl::unexpected(captured.error());
     auto settings = options.levels;
     settings.step = LatticeUnits(step / lattice.step());
+    const auto begin = std::clock();
     const auto coded = encode_leveled_intra(*captured, settings);
+    const double encode_ms = milliseconds_since(begin);
     if (!coded) return tl::unexpected(coded.error());
     const auto& levels = coded->levels;
-    const auto again = decode_surface_levels(levels.run, coded->decoded_base, levels.surface.positions.size());
+    const auto again = decode_surface_levels(levels.payload, coded->decoded_base, levels.surface.positions.size());
     if (!again) return tl::unexpected(again.error());
     if (again->positions != levels.surface.positions || again->triangles != levels.surface.triangles)
         return fail(ErrorKind::corrupt_stream, "what is decoded is not what was encoded");
-    constexpr std::size_t layer_overhead = 3;  // the layer's number and length
     Point out;
     out.setting = fmt::format("step {:g}", step);
-    out.bytes = write_frame_payload(coded->base).size() + layer_overhead + levels.run.size() + packet_overhead;
+    out.bytes = write_frame_payload(coded->base).size() + layer_overhead + levels.payload.size() + packet_overhead;
     out.vertices = levels.surface.positions.size();
     out.base_vertices = coded->decoded_base.positions.size();
     out.connectivity = coded->base.of(Layer::fans).size();
     out.base_positions = coded->base.of(Layer::geometry).size();
     out.parts = levels.parts;
+    out.encode_ms = encode_ms;
+    for (std::uint32_t k = 0; k < levels.parts.size(); ++k) {
+        auto shown = shown_down_to(*coded, k);
+        if (!shown) return tl::unexpected(shown.error());
+        out.shown.push_back(*shown);
+    }
     LatticeMesh shown;
     shown.positions = levels.surface.positions;
     shown.triangles = levels.surface.triangles;
@@ -129,6 +172,8 @@ nlohmann::json json_of(const Point& p) {
     out["base_position_bytes"] = p.base_positions;
     for (const auto& part : p.parts)
         out["levels"].push_back({{"vertices", part.vertices}, {"moved", part.moved}, {"bytes", part.bytes}});
+    out["encode_ms"] = p.encode_ms;
+    for (const auto& shown : p.shown) out["shown"].push_back({{"bytes", shown.bytes}, {"decode_ms", shown.decode_ms}});
     return out;
 }
 
@@ -140,6 +185,8 @@ void print(const Point& p) {
         fmt::print("{:>7} {:<6}", part.bytes,
                    fmt::format("({:.0f}%)", 100 * static_cast<double>(part.moved) /
                                                 static_cast<double>(std::max<std::size_t>(part.vertices, 1))));
+    if (!p.shown.empty()) fmt::print("\n{:12}encoded in {:.0f} ms; shown down to each level:", "", p.encode_ms);
+    for (const auto& shown : p.shown) fmt::print("  {} bytes in {:.2f} ms", shown.bytes, shown.decode_ms);
     fmt::print("\n");
     std::fflush(stdout);
 }
@@ -248,7 +295,9 @@ void add_hierarchy(CLI::App& app, app::Run& run) {
     command->add_flag("--json", options->json, "Print the result as JSON on standard output");
     command->footer(
         "Geometry alone, without the noise filter. One step says how fine everything is. Displacements are those of\n"
-        "the base and of each level, in bytes, and the share of vertices that they move.\n\n"
+        "the base and of each level, in bytes, and the share of vertices that they move. Below: the processor's time "
+        "of encoding,\n"
+        "and the bytes and median time of decoding the base alone, then with one level, with two and so on.\n\n"
         "Example:\n"
         "  htvm-lab hierarchy capture/ --at 0,30 -q 30,40,50,60");
     command->callback([options, &run] { run = [options] { return run_hierarchy(*options); }; });

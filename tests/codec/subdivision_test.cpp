@@ -71,6 +71,28 @@ TEST(Subdivision, edges_are_numbered_as_triangles_name_them) {
     EXPECT_EQ(edges.of_triangle[2], (std::array<std::uint32_t, 3>{no_element, no_element, no_element}));
 }
 
+TEST(Subdivision, each_level_splits_the_edges_of_the_one_above_in_their_order) {
+    const auto base = ball(2, [](const Vector3d& d) { return 400 + 300 * d[0] * d[0] * d[0]; });
+    const auto levels = subdivide(base, {.levels = 4, .longest_edge = 45}, 1 << 20);
+    ASSERT_TRUE(levels);
+    std::span<const Triangle> above = base.triangles;
+    for (const auto& level : *levels) {
+        const auto edges = find_edges(level.first, above);
+        std::vector<std::uint32_t> split;
+        for (std::uint32_t e = 0; e < edges.size() && split.size() < level.stencils.size(); ++e) {
+            const auto& next = level.stencils[split.size()];
+            if (edges.ends[e] == std::array{next.a, next.b}) split.push_back(e);
+        }
+        ASSERT_EQ(split.size(), level.stencils.size());
+        const auto stencils = edge_stencils(level.first, above, edges, split);
+        for (std::size_t i = 0; i < stencils.size(); ++i) {
+            ASSERT_EQ(stencils[i].across, level.stencils[i].across);
+            ASSERT_EQ(stencils[i].wings, level.stencils[i].wings);
+        }
+        above = level.triangles;
+    }
+}
+
 TEST(Subdivision, what_is_closed_stays_closed_at_every_depth) {
     const auto base = ball(2, [](const Vector3d& d) { return 400 + 300 * d[0] * d[0] * d[0]; });
     for (const std::uint32_t longest : {20u, 45u, 70u, 100u, 150u}) {

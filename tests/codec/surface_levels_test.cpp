@@ -18,34 +18,35 @@ namespace {
 
 using test::ball;
 
-// A run of these levels on a base, whose displacements are random ones.
-struct RandomRun {
+// A payload of these levels on a base, whose displacements are random ones.
+struct RandomPayload {
     std::vector<std::uint8_t> bytes;
     LeveledSurface surface;
 };
-RandomRun random_run(const LatticeMesh& base, const SurfaceLevels& levels, unsigned seed, std::int32_t most) {
+RandomPayload random_payload(const LatticeMesh& base, const SurfaceLevels& levels, unsigned seed, std::int32_t most) {
     std::mt19937 random(seed);
     const auto subdivision = subdivide(base, levels.depth, 1 << 20);
-    RangeEncoder encoder;
-    WritingCoder<RangeEncoder> coder{encoder};
-    code_levels_header(coder, levels);
+    std::vector<std::vector<std::uint8_t>> runs;
     DisplacementModels models;
-    RandomRun out;
+    RandomPayload out;
     std::vector<std::int32_t> values;
     out.surface.triangles = base.triangles;
     for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) {
         const auto* level = k > 0 ? &(*subdivision)[k - 1] : nullptr;
         const auto expected =
-            level ? expected_level(*level, out.surface.positions, out.surface.triangles, levels.rules[k - 1])
-                  : expected_base(base);
+            level ? ExpectedLevel(*level, out.surface.positions, out.surface.triangles, levels.rules[k - 1])
+                  : ExpectedLevel(base);
+        RangeEncoder encoder;
+        WritingCoder<RangeEncoder> coder{encoder};
         code_displacements(coder, models, level, k, expected, step_at(levels, k), out.surface.positions, values,
                            [&](std::size_t, const DisplacementContext&) {
                                return random() % 3 == 0 ? static_cast<std::int32_t>(random() % (2u * most + 1)) - most
                                                         : 0;
                            });
         if (level) out.surface.triangles = level->triangles;
+        runs.push_back(encoder.finish());
     }
-    out.bytes = encoder.finish();
+    out.bytes = write_surface_levels(levels, runs);
     return out;
 }
 
@@ -65,34 +66,113 @@ TEST(SurfaceLevels, any_displacements_on_any_mesh_come_back_to_the_bit) {
         auto levels = some_levels(seed % 4, 1u << (seed % 20));
         levels.coarser = 1 + seed % 16;
         if (!subdivide(base, levels.depth, 20000)) continue;
-        const auto run = random_run(base, levels, seed, seed % 7 == 0 ? most_displacement : 30);
-        const auto decoded = decode_surface_levels(run.bytes, base, 20000);
+        const auto payload = random_payload(base, levels, seed, seed % 7 == 0 ? most_displacement : 30);
+        const auto decoded = decode_surface_levels(payload.bytes, base, 20000);
         ASSERT_TRUE(decoded) << decoded.error().message;
-        ASSERT_EQ(decoded->positions, run.surface.positions);
-        ASSERT_EQ(decoded->triangles, run.surface.triangles);
+        ASSERT_EQ(decoded->positions, payload.surface.positions);
+        ASSERT_EQ(decoded->triangles, payload.surface.triangles);
         for (const auto p : decoded->positions) ASSERT_TRUE(on_lattice(p));
         ++seed;
     }
 }
 
-TEST(SurfaceLevels, a_run_that_is_cut_is_refused_or_gives_points_on_the_lattice) {
+// What is there of the first levels only.
+std::span<const std::uint8_t> down_to(const std::vector<std::uint8_t>& payload, std::uint32_t level) {
+    return std::span(payload).first(read_levels_header(payload)->ends[level]);
+}
+
+TEST(SurfaceLevels, fewer_levels_are_the_first_ones_of_the_whole_and_need_their_bytes_alone) {
+    for (const std::uint32_t count : {0u, 1u, 3u, 5u}) {
+        const auto base = ball(1, [](const Vector3d& d) { return 1000 + 300 * d[1] * d[1]; });
+        const auto levels = some_levels(count, 90);
+        const auto whole = random_payload(base, levels, count, 25);
+        const auto subdivision = subdivide(base, levels.depth, 1 << 20);
+        for (std::uint32_t k = 0; k <= count; ++k) {
+            const auto first = decode_surface_levels(down_to(whole.bytes, k), base, 1 << 20, k);
+            ASSERT_TRUE(first) << first.error().message;
+            const auto vertices =
+                k == 0 ? base.positions.size() : (*subdivision)[k - 1].first + (*subdivision)[k - 1].stencils.size();
+            ASSERT_EQ(first->positions, std::vector(whole.surface.positions.begin(),
+                                                    whole.surface.positions.begin() + std::ptrdiff_t(vertices)));
+            ASSERT_EQ(first->triangles, k == 0 ? base.triangles : (*subdivision)[k - 1].triangles);
+            auto garbled = whole.bytes;
+            for (std::size_t i = read_levels_header(whole.bytes)->ends[k]; i < garbled.size(); ++i) garbled[i] ^= 0x5A;
+            const auto same = decode_surface_levels(garbled, base, 1 << 20, k);
+            ASSERT_TRUE(same);
+            ASSERT_EQ(same->positions, first->positions);
+        }
+    }
+}
+
+TEST(SurfaceLevels, levels_that_are_not_asked_for_do_not_count_against_the_limit) {
     const auto base = ball(2, [](const Vector3d&) { return 1000; });
-    const auto run = random_run(base, some_levels(2, 100), 5, 20);
+    const auto payload = random_payload(base, some_levels(3, 20), 1, 3);
+    EXPECT_TRUE(decode_surface_levels(payload.bytes, base, base.positions.size(), 0));
+    EXPECT_FALSE(decode_surface_levels(payload.bytes, base, base.positions.size(), 1));
+}
+
+TEST(SurfaceLevels, the_header_says_where_each_run_ends) {
+    const auto base = ball(2, [](const Vector3d&) { return 1000; });
+    auto levels = some_levels(2, 100);
+    levels.step = 1 << 20;
+    levels.depth.longest_edge = 1 << 20;
+    levels.coarser = 16;
+    levels.rules[1] = {15, 15};
+    const auto header = read_levels_header(random_payload(base, levels, 5, 20).bytes);
+    ASSERT_TRUE(header);
+    EXPECT_EQ(header->levels.step, levels.step);
+    EXPECT_EQ(header->levels.depth.longest_edge, levels.depth.longest_edge);
+    EXPECT_EQ(header->levels.coarser, levels.coarser);
+    EXPECT_EQ(header->levels.rules[1], levels.rules[1]);
+    EXPECT_GT(header->ends[0], header->first_run);
+    EXPECT_EQ(header->ends[1], header->ends[0]) << "no edge is as long, so nothing is coded";
+}
+
+TEST(SurfaceLevels, a_payload_that_is_cut_is_refused_wherever_it_is_cut) {
+    const auto base = ball(2, [](const Vector3d&) { return 1000; });
+    const auto payload = random_payload(base, some_levels(2, 100), 5, 20);
+    for (std::size_t size = 0; size < payload.bytes.size(); ++size) {
+        const auto decoded = decode_surface_levels(std::span(payload.bytes).first(size), base, 1 << 16);
+        ASSERT_FALSE(decoded);
+        EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream);
+    }
+    auto longer = payload.bytes;
+    longer.push_back(0);
+    EXPECT_FALSE(decode_surface_levels(longer, base, 1 << 16)) << "bytes behind the last run";
+}
+
+TEST(SurfaceLevels, a_run_that_says_to_be_shorter_than_it_is_is_refused_or_gives_points_on_the_lattice) {
+    const auto base = ball(2, [](const Vector3d&) { return 1000; });
+    const auto whole = random_payload(base, some_levels(0, 100), 5, 20).bytes;
+    const std::span run = std::span(whole).subspan(read_levels_header(whole)->first_run);
     std::size_t refused = 0;
-    for (std::size_t size = 0; size < run.bytes.size(); size += 7) {
-        const auto decoded = decode_surface_levels(std::span(run.bytes).first(size), base, 1 << 16);
+    for (std::size_t size = 0; size < run.size(); size += 3) {
+        const std::vector<std::vector<std::uint8_t>> shorter{{run.begin(), run.begin() + std::ptrdiff_t(size)}};
+        const auto decoded = decode_surface_levels(write_surface_levels(some_levels(0, 100), shorter), base, 1 << 16);
         refused += !decoded;
         if (!decoded) continue;
         for (const auto p : decoded->positions) ASSERT_TRUE(on_lattice(p));
     }
-    EXPECT_GT(refused, run.bytes.size() / 8);
+    EXPECT_GT(refused, run.size() / 4);
+}
+
+TEST(SurfaceLevels, numbers_out_of_range_are_refused) {
+    const auto base = ball(0, [](const Vector3d&) { return 1000; });
+    const auto refused = [&](const std::vector<std::uint8_t>& payload) {
+        const auto decoded = decode_surface_levels(payload, base, 1 << 16);
+        return !decoded && decoded.error().kind == ErrorKind::corrupt_stream;
+    };
+    EXPECT_TRUE(refused({9, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0})) << "levels";
+    EXPECT_TRUE(refused({0, 0x80, 0x80, 0x40, 0, 0})) << "longest edge";
+    EXPECT_TRUE(refused({0, 0, 0x80, 0x80, 0x40, 0})) << "step";
+    EXPECT_TRUE(refused({0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1})) << "a run's size";
 }
 
 TEST(SurfaceLevels, more_vertices_than_allowed_are_refused) {
     const auto base = ball(2, [](const Vector3d&) { return 1000; });
-    const auto run = random_run(base, some_levels(3, 20), 1, 3);
-    ASSERT_TRUE(decode_surface_levels(run.bytes, base, run.surface.positions.size()));
-    const auto refused = decode_surface_levels(run.bytes, base, run.surface.positions.size() - 1);
+    const auto payload = random_payload(base, some_levels(3, 20), 1, 3);
+    ASSERT_TRUE(decode_surface_levels(payload.bytes, base, payload.surface.positions.size()));
+    const auto refused = decode_surface_levels(payload.bytes, base, payload.surface.positions.size() - 1);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().kind, ErrorKind::limit);
 }
@@ -138,7 +218,7 @@ TEST(LeveledIntra, the_decoder_has_what_the_encoder_says) {
     const auto base = decode_intra_frame(view_of(coded->base), nullptr);
     ASSERT_TRUE(base);
     EXPECT_EQ(base->positions, coded->decoded_base.positions);
-    const auto decoded = decode_surface_levels(coded->levels.run, *base, 1 << 20);
+    const auto decoded = decode_surface_levels(coded->levels.payload, *base, 1 << 20);
     ASSERT_TRUE(decoded);
     EXPECT_EQ(decoded->positions, coded->levels.surface.positions);
     EXPECT_EQ(decoded->triangles, coded->levels.surface.triangles);
@@ -155,9 +235,9 @@ TEST(LeveledIntra, a_finer_step_comes_nearer_for_more_bytes) {
         const double now = rms_between(captured.positions, surface.positions, surface.triangles);
         EXPECT_LT(now, 0.5 * step);
         EXPECT_LT(now, error);
-        EXPECT_GT(coded->levels.run.size(), bytes);
+        EXPECT_GT(coded->levels.payload.size(), bytes);
         error = now;
-        bytes = coded->levels.run.size();
+        bytes = coded->levels.payload.size();
     }
 }
 
@@ -171,7 +251,7 @@ TEST(LeveledIntra, it_takes_fewer_bytes_than_an_intra_frame_that_is_as_near) {
     const auto& surface = coded->levels.surface;
     EXPECT_LT(rms_between(captured.positions, surface.positions, surface.triangles),
               1.2 * rms_between(captured.positions, intra->positions, intra->triangles));
-    EXPECT_LT(write_frame_payload(coded->base).size() + coded->levels.run.size(),
+    EXPECT_LT(write_frame_payload(coded->base).size() + coded->levels.payload.size(),
               write_frame_payload(payload).size() / 2);
 }
 
@@ -221,7 +301,7 @@ TEST(LeveledIntra, what_is_in_no_order_is_coded_without_harm) {
         if (seed++ % 8 != 0) continue;
         const auto coded = encode_leveled_intra(mesh, {.step = LatticeUnits(4)});
         if (!coded) continue;
-        const auto decoded = decode_surface_levels(coded->levels.run, coded->decoded_base, 1 << 22);
+        const auto decoded = decode_surface_levels(coded->levels.payload, coded->decoded_base, 1 << 22);
         ASSERT_TRUE(decoded);
         ASSERT_EQ(decoded->positions, coded->levels.surface.positions);
     }

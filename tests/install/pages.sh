@@ -78,7 +78,7 @@ offers 'person.htvm' 'htvm decode -o out p'
 offers 'capture' 'htvm synth -o c'
 offers 'animate|gap' 'htvm decode a.htvm --conceal '
 offers 'flat|smooth|unlit' 'htvm compare a b --shading '
-offers 'bake|decoding|endure|events|help|rd|reproduce' 'htvm-lab '
+offers 'bake|decoding|endure|events|help|hierarchy|rd|reproduce' 'htvm-lab '
 offers 'm1|m2|m3' 'htvm-lab rd --metrics m'
 # The other shells, where they are.
 if command -v fish >/dev/null; then

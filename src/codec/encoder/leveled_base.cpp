@@ -32,15 +32,22 @@ LatticeMesh simplified(const LatticeMesh& captured, const LeveledBaseOptions& op
 // How far each captured vertex is from the base's subdivided surface where it fits best, in lattice units.
 std::vector<double> left_aside(const LatticeMesh& captured, const SurfaceIndex& sampled, const LatticeMesh& base,
                                const LeveledBaseOptions& options) {
-    constexpr int rounds = 4;
+    constexpr int rounds = 2, choices = 2;  // more bring nothing here
+    // Without the finest level, which hardly any displacement moves: what is left aside is left by those above.
+    SubdivisionDepth depth = options.depth;
+    if (depth.levels > 1) {
+        --depth.levels;
+        depth.longest_edge *= 2;
+    }
     SurfaceLevels levels;
-    levels.depth = options.depth;
+    levels.depth = depth;
     levels.step = static_cast<std::uint32_t>(std::max(1.0, options.step.value * (1 << displacement_bits)));
     levels.rules.fill(options.rule);
     std::vector<double> out;
-    const auto subdivision = subdivide(base, options.depth, most_vertices);
+    const auto subdivision = subdivide(base, depth, most_vertices);
     if (!subdivision) return out;
     SurfaceFitOptions fit_options;
+    fit_options.choices = choices;
     fit_options.threads = options.threads;
     SurfaceFit fit(sampled, base, *subdivision, levels, fit_options);
     fit.improve(0, rounds);

@@ -65,9 +65,7 @@ std::int32_t chosen_value(const DisplacementModels& models, const DisplacementCo
 Result<EncodedSurfaceLevels> encode_surface_levels(const SurfaceIndex& captured, const LatticeMesh& base,
                                                    const SurfaceLevelsOptions& options) {
     EncodedSurfaceLevels out;
-    RangeEncoder encoder;
-    WritingCoder<RangeEncoder> coder{encoder};
-    const auto levels = code_levels_header(coder, options.levels);
+    const auto& levels = options.levels;
     const auto whole = subdivide(base, levels.depth, most_vertices);
     if (!whole) return fail(ErrorKind::limit, "surface levels: more vertices than can be coded; ask for longer edges");
     const auto& subdivision = *whole;
@@ -76,17 +74,19 @@ Result<EncodedSurfaceLevels> encode_surface_levels(const SurfaceIndex& captured,
     std::vector<std::int32_t> values;
     DisplacementModels models;
     auto& positions = out.surface.positions;
-    std::size_t position = 0;
+    std::vector<std::vector<std::uint8_t>> runs;
     for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) {
         const auto* level = k > 0 ? &subdivision[k - 1] : nullptr;
         const auto& above = k > 1 ? subdivision[k - 2].triangles : base.triangles;
         const auto expected =
-            level ? expected_level(*level, positions, above, levels.rules[k - 1]) : expected_base(base);
+            level ? ExpectedLevel(*level, positions, above, levels.rules[k - 1]) : ExpectedLevel(base);
         const std::size_t first = positions.size();
         const auto step = step_at(levels, k);
         const double in_steps = (1 << displacement_bits) / static_cast<double>(step);
         const double weight = static_cast<double>(step) * step / (static_cast<double>(levels.step) * levels.step);
         std::size_t moved = 0;
+        RangeEncoder encoder;
+        WritingCoder<RangeEncoder> coder{encoder};
         code_displacements(coder, models, level, k, expected, step, positions, values,
                            [&](std::size_t i, const DisplacementContext& context) {
                                const std::size_t v = first + i;
@@ -98,10 +98,10 @@ Result<EncodedSurfaceLevels> encode_surface_levels(const SurfaceIndex& captured,
                                return value;
                            });
         if (k < levels.depth.levels) fit.improve(k + std::size_t{1}, 1);
-        out.parts.push_back({positions.size() - first, moved, encoder.position() - position});
-        position = encoder.position();
+        runs.push_back(encoder.finish());
+        out.parts.push_back({positions.size() - first, moved, runs.back().size()});
     }
-    out.run = encoder.finish();
+    out.payload = write_surface_levels(levels, runs);
     out.surface.triangles = subdivision.empty() ? base.triangles : subdivision.back().triangles;
     return out;
 }

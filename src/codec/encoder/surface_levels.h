@@ -15,12 +15,12 @@ namespace htvm::internal {
 struct SurfaceLevelsOptions {
     SurfaceLevels levels;
     double lambda = 0.06;  // squared steps that a bit must spare
-    int rounds = 5;        // of the fit, before the first level is coded
+    int rounds = 4;        // of the fit, before the first level is coded
     SurfaceFitOptions fit;
 };
 
 struct EncodedSurfaceLevels {
-    std::vector<std::uint8_t> run;
+    std::vector<std::uint8_t> payload;
     LeveledSurface surface;  // that the decoder will have
     struct Part {
         std::size_t vertices = 0, moved = 0;  // and how many of them are displaced

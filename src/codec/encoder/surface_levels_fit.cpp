@@ -61,10 +61,11 @@ void SurfaceFit::rebuild() {
     farthest_.assign(displacements_.size(), 0);
     const std::vector<Triangle>* triangles = &base_.triangles;
     for (std::size_t k = 0; k <= subdivision_.size(); ++k) {
-        auto expected = k == 0 ? expected_base(base_)
-                               : expected_level(subdivision_[k - 1], positions_, *triangles, levels_.rules[k - 1]);
-        for (std::size_t i = 0; i < expected.at.size(); ++i) {
-            const Vector3d at = expected.at[i] + expected.normal[i] * displacements_[positions_.size()];
+        const auto expected = k == 0 ? ExpectedLevel(base_)
+                                     : ExpectedLevel(subdivision_[k - 1], positions_, *triangles, levels_.rules[k - 1]);
+        for (std::size_t i = 0; i < expected.size(); ++i) {
+            normals_.push_back(expected.normal(i));
+            const Vector3d at = expected.vertex(i).at + normals_.back() * displacements_[positions_.size()];
             positions_.push_back({within_lattice(std::llround(at[0])), within_lattice(std::llround(at[1])),
                                   within_lattice(std::llround(at[2]))});
         }
@@ -79,14 +80,13 @@ void SurfaceFit::rebuild() {
                     farthest_[v] = options_.farthest * sum / static_cast<double>(around.of(v).size());
             }
         } else {
-            for (std::size_t i = 0; i < expected.at.size(); ++i) {
+            for (std::size_t i = 0; i < expected.size(); ++i) {
                 const auto& stencil = subdivision_[k - 1].stencils[i];
                 farthest_[subdivision_[k - 1].first + i] =
                     options_.farthest * length(to_vector(positions_[stencil.b]) - to_vector(positions_[stencil.a]));
             }
         }
-        normals_.insert(normals_.end(), expected.normal.begin(), expected.normal.end());
-        above_.push_back(std::move(expected.above));
+        above_.push_back(expected.normals_above());
         if (k > 0) triangles = &subdivision_[k - 1].triangles;
     }
 }
@@ -106,7 +106,7 @@ void SurfaceFit::find_samples() {
         const auto& t = triangles[found[i].triangle];
         const Vector3d normal = normalised(area_vector(std::span<const LatticePoint>(positions_), t));
         const double residual = dot(to_vector(points_[i]) - to_vector(found[i].point), normal);
-        samples_.push_back({t, found[i].shares, normal, residual, areas_[i]});
+        samples_.push_back({t, found[i].shares, to_floats(normal), static_cast<float>(residual), areas_[i]});
     }
     find_samples_back(triangles);
     weigh();
@@ -123,6 +123,7 @@ void SurfaceFit::find_samples_back(std::span<const Triangle> triangles) {
     const auto normals = vertex_normals(positions_, triangles);
     std::vector<Point3f> facing;
     for (const auto& n : normals) facing.push_back(to_floats(n));
+    samples_back_.clear();
     guesses_back_.resize(positions_.size(), OrientedPoints::no_point);
     const auto found =
         closest_facing(captured_, points_of(positions_), facing, {.reach = reach_, .agreement = options_.agreement},
@@ -130,7 +131,7 @@ void SurfaceFit::find_samples_back(std::span<const Triangle> triangles) {
     for (std::uint32_t v = 0; v < positions_.size(); ++v) {
         if (!found[v].found()) continue;
         const double residual = dot(to_vector(found[v].point) - to_vector(positions_[v]), normals[v]);
-        samples_.push_back({{v, v, v}, {1, 0, 0}, normals[v], residual, options_.back * area[v]});
+        samples_back_.push_back({v, normals[v], residual, options_.back * area[v]});
     }
 }
 
@@ -139,6 +140,7 @@ void SurfaceFit::weigh() {
     mass_.assign(displacements_.size(), 0);
     for (const auto& s : samples_)
         for (std::size_t i = 0; i < 3; ++i) mass_[s.corners[i]] += s.weight * s.shares[i];
+    for (const auto& s : samples_back_) mass_[s.vertex] += s.weight;
     for (std::size_t k = subdivision_.size(); k > 0; --k)
         for (std::size_t i = subdivision_[k - 1].stencils.size(); i-- > 0;) {
             const auto& stencil = subdivision_[k - 1].stencils[i];
@@ -194,12 +196,17 @@ std::vector<Vector3d> SurfaceFit::moved_by(std::span<const double> change) const
 std::vector<double> SurfaceFit::gradient(std::span<const Vector3d> moved, bool residuals) const {
     std::vector<Vector3d> pull(moved.size(), Vector3d{});
     for (const auto& s : samples_) {
-        double residual = residuals ? s.residual : 0;
-        for (std::size_t i = 0; i < 3; ++i)
-            residual -= static_cast<double>(s.shares[i]) * dot(moved[s.corners[i]], s.normal);
-        const Vector3d force = s.normal * (residual * s.weight);
+        const Vector3d normal = to_vector(s.normal);
+        Vector3d there{};
+        for (std::size_t i = 0; i < 3; ++i) there = there + moved[s.corners[i]] * static_cast<double>(s.shares[i]);
+        const double residual = (residuals ? static_cast<double>(s.residual) : 0) - dot(there, normal);
+        const Vector3d force = normal * (residual * static_cast<double>(s.weight));
         for (std::size_t i = 0; i < 3; ++i)
             pull[s.corners[i]] = pull[s.corners[i]] + force * static_cast<double>(s.shares[i]);
+    }
+    for (const auto& s : samples_back_) {
+        const double residual = (residuals ? s.residual : 0) - dot(moved[s.vertex], s.normal);
+        pull[s.vertex] = pull[s.vertex] + s.normal * (residual * s.weight);
     }
     std::vector<double> out(moved.size());
     for (std::size_t k = subdivision_.size(); k > 0; --k) {
@@ -245,8 +252,8 @@ double SurfaceFit::least(std::size_t v) const {
     return options_.least_moved * step * std::sqrt(finest_mass_ / mass_[v]);
 }
 
-// Finds the changes of those that are free that fit best, by conjugate gradients.
-void SurfaceFit::solve(std::span<const std::uint8_t> is_free) {
+// Finds the changes of those that are free that fit best, by conjugate gradients. rest: the gradient where they are.
+void SurfaceFit::solve(std::span<const std::uint8_t> is_free, std::vector<double> rest) {
     const auto restricted = [&](std::vector<double> x) {
         for (std::size_t v = 0; v < x.size(); ++v)
             if (is_free[v] == 0) x[v] = 0;
@@ -264,7 +271,6 @@ void SurfaceFit::solve(std::span<const std::uint8_t> is_free) {
         return sum;
     };
     const double held = options_.held * finest_mass_;
-    auto rest = gradient(moved_by(change_), true);
     for (std::size_t v = 0; v < rest.size(); ++v) rest[v] -= held * (displacements_[v] + change_[v]);
     rest = restricted(std::move(rest));
     auto along = preconditioned(rest);
@@ -291,13 +297,13 @@ void SurfaceFit::solve(std::span<const std::uint8_t> is_free) {
 // be large enough by themselves, are fitted together, and then the small ones of them taken out.
 void SurfaceFit::choose_and_solve(std::size_t first) {
     std::vector<std::uint8_t> is_free(displacements_.size(), 0);
-    const auto wanted = gradient(moved_by(change_), true);
+    auto wanted = gradient(moved_by(change_), true);
     for (std::size_t v = first; v < is_free.size(); ++v) {
         if (!(mass_[v] > 0)) continue;
         const double now = displacements_[v] + change_[v];
         is_free[v] = now != 0 || v < base_.positions.size() || std::abs(now + wanted[v] / mass_[v]) >= least(v);
     }
-    solve(is_free);
+    solve(is_free, std::move(wanted));
     for (std::size_t v = first; v < is_free.size(); ++v) {
         if (is_free[v] == 0) continue;
         double now = displacements_[v] + change_[v];

@@ -53,6 +53,12 @@ private:
     struct Sample {
         Triangle corners;
         std::array<float, 3> shares;
+        Vector3f normal;
+        float residual, weight;
+    };
+    // Of a vertex of the shown surface.
+    struct SampleBack {
+        std::uint32_t vertex;
         Vector3d normal;
         double residual, weight;
     };
@@ -63,7 +69,7 @@ private:
     std::vector<Vector3d> moved_by(std::span<const double> change) const;
     std::vector<double> gradient(std::span<const Vector3d> moved, bool residuals) const;
     double least(std::size_t v) const;
-    void solve(std::span<const std::uint8_t> is_free);
+    void solve(std::span<const std::uint8_t> is_free, std::vector<double> rest);
     void choose_and_solve(std::size_t first);
     std::size_t begin_of(std::size_t level) const;
     std::size_t end_of(std::size_t level) const;
@@ -85,6 +91,7 @@ private:
     std::vector<Vector3d> normals_;             // along which each vertex is displaced
     std::vector<std::vector<Vector3d>> above_;  // by level, the normals of all vertices above
     std::vector<Sample> samples_;
+    std::vector<SampleBack> samples_back_;
 };
 
 }  // namespace htvm::internal

@@ -89,18 +89,18 @@ MeshEdges find_edges(std::size_t vertices, std::span<const Triangle> triangles) 
 
 std::vector<EdgeStencil> edge_stencils(std::size_t vertices, std::span<const Triangle> triangles,
                                        const MeshEdges& edges, std::span<const std::uint32_t> wanted) {
-    const auto borders = borders_at(vertices, edges);
+    std::vector<std::array<std::uint32_t, 2>> borders;
+    for (const auto sides : edges.sides) {
+        if (sides != 1) continue;
+        borders = borders_at(vertices, edges);
+        break;
+    }
     // The vertex behind a side of a triangle.
-    const auto behind = [&](std::uint32_t triangle, std::uint32_t from, std::uint32_t to) {
-        for (std::size_t i = 0; i < 3; ++i) {
-            const auto e = edges.of_triangle[triangle][i];
-            const auto& ends = edges.ends[e];
-            if (ends[0] != std::min(from, to) || ends[1] != std::max(from, to)) continue;
-            if (edges.sides[e] != 2) return no_element;
-            const auto other = edges.triangles[e][edges.triangles[e][0] == triangle ? 1 : 0];
-            return third_corner(triangles[other], from, to);
-        }
-        return no_element;
+    const auto behind = [&](std::uint32_t triangle, std::uint32_t side) {
+        if (edges.sides[side] != 2) return no_element;
+        const auto& both = edges.triangles[side];
+        const auto& ends = edges.ends[side];
+        return third_corner(triangles[both[both[0] == triangle ? 1 : 0]], ends[0], ends[1]);
     };
     std::vector<EdgeStencil> out;
     out.reserve(wanted.size());
@@ -114,8 +114,11 @@ std::vector<EdgeStencil> edge_stencils(std::size_t vertices, std::span<const Tri
         if (edges.sides[e] == 2)
             for (std::size_t k = 0; k < 2; ++k) {
                 const auto t = edges.triangles[e][k];
-                const auto c = s.across[k] = third_corner(triangles[t], s.a, s.b);
-                s.wings[k] = {behind(t, s.a, c), behind(t, s.b, c)};
+                const auto& sides = edges.of_triangle[t];
+                const std::size_t i = sides[0] == e ? 0 : sides[1] == e ? 1 : 2, next = (i + 1) % 3, last = (i + 2) % 3;
+                s.across[k] = triangles[t][last];
+                s.wings[k] = {behind(t, sides[last]), behind(t, sides[next])};
+                if (triangles[t][i] != s.a) std::swap(s.wings[k][0], s.wings[k][1]);
             }
         if (edges.sides[e] == 1)
             for (std::size_t k = 0; k < 2; ++k) {
@@ -176,21 +179,30 @@ Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<cons
     return out;
 }
 
-std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
-                                      std::span<const std::uint32_t> vertex_of_edge, std::span<const Vector3d> places) {
-    std::vector<Triangle> out;
-    out.reserve(4 * triangles.size());
+namespace {
+
+// Cuts the triangles whose edges have a new vertex, and calls part(corners, sides) with each that comes of it. places:
+// of all vertices, old and new. vertex_of_edge: the number of each edge's new vertex, or no_element. Sides have a
+// number each that tells them from all others: twice that of an edge, and one more for its upper half if it is split;
+// after those, three for the sides that are new within each triangle.
+template <class Part>
+void cut_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
+                   std::span<const std::uint32_t> vertex_of_edge, std::span<const Vector3d> places, const Part& part) {
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         const auto& corners = triangles[t];
-        std::array<std::uint32_t, 3> middle{no_element, no_element, no_element};
+        const auto& sides = edges.of_triangle[t];
+        if (sides[0] == no_element) {
+            part(corners, sides);
+            continue;
+        }
+        std::array<std::uint32_t, 3> middle;
         std::size_t split = 0;
         for (std::size_t i = 0; i < 3; ++i) {
-            const auto e = edges.of_triangle[t][i];
-            if (e != no_element) middle[i] = vertex_of_edge[e];
+            middle[i] = vertex_of_edge[sides[i]];
             split += middle[i] != no_element;
         }
         if (split == 0) {
-            out.push_back(corners);
+            part(corners, {2 * sides[0], 2 * sides[1], 2 * sides[2]});
             continue;
         }
         // Turned so that the side that is split, or is not, where one is alone, is the first.
@@ -198,28 +210,71 @@ std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const
         while (split < 3 && (middle[k] != no_element) != (split == 1)) ++k;
         const auto a = corners[k], b = corners[(k + 1) % 3], c = corners[(k + 2) % 3];
         const auto ab = middle[k], bc = middle[(k + 1) % 3], ca = middle[(k + 2) % 3];
+        const auto whole = [&](std::size_t side) { return 2 * sides[(k + side) % 3]; };
+        const auto half = [&](std::size_t side, std::uint32_t end) {
+            const auto e = sides[(k + side) % 3];
+            return 2 * e + (end != edges.ends[e][0]);
+        };
+        const auto inside = static_cast<std::uint32_t>(2 * edges.size() + 3 * t);
         if (split == 1) {
-            out.push_back({a, ab, c});
-            out.push_back({ab, b, c});
+            part({a, ab, c}, {half(0, a), inside, whole(2)});
+            part({ab, b, c}, {half(0, b), whole(1), inside});
         } else if (split == 2) {
             const Vector3d from_a = places[bc] - places[a], from_b = places[ca] - places[b];
             if (dot(from_a, from_a) <= dot(from_b, from_b)) {
-                out.push_back({a, b, bc});
-                out.push_back({a, bc, ca});
+                part({a, b, bc}, {whole(0), half(1, b), inside});
+                part({a, bc, ca}, {inside, inside + 1, half(2, a)});
             } else {
-                out.push_back({a, b, ca});
-                out.push_back({b, bc, ca});
+                part({a, b, ca}, {whole(0), inside, half(2, a)});
+                part({b, bc, ca}, {half(1, b), inside + 1, inside});
             }
-            out.push_back({ca, bc, c});
+            part({ca, bc, c}, {inside + 1, half(1, c), half(2, c)});
         } else {
-            out.push_back({a, ab, ca});
-            out.push_back({ab, b, bc});
-            out.push_back({ca, bc, c});
-            out.push_back({ab, bc, ca});
+            part({a, ab, ca}, {half(0, a), inside, half(2, a)});
+            part({ab, b, bc}, {half(0, b), half(1, b), inside + 1});
+            part({ca, bc, c}, {inside + 2, half(1, c), half(2, c)});
+            part({ab, bc, ca}, {inside + 1, inside + 2, inside});
         }
     }
-    return out;
 }
+
+// The edges of what cut_triangles() gives, in the order in which it names them; parts: how many triangles there are.
+class EdgesOfParts {
+public:
+    EdgesOfParts(const MeshEdges& edges, std::size_t triangles, std::size_t parts)
+        : number_(2 * edges.size() + 3 * triangles, no_element) {
+        const std::size_t most = 3 * parts / 2 + 1;  // unless there are many borders
+        out_.ends.reserve(most);
+        out_.triangles.reserve(most);
+        out_.sides.reserve(most);
+        out_.of_triangle.reserve(parts);
+    }
+    void add(const Triangle& corners, const std::array<std::uint32_t, 3>& sides) {
+        const auto t = static_cast<std::uint32_t>(out_.of_triangle.size());
+        auto& own = out_.of_triangle.emplace_back(sides);
+        if (sides[0] == no_element) return;
+        for (std::size_t i = 0; i < 3; ++i) {
+            auto& e = number_[sides[i]];
+            if (e == no_element) {
+                e = static_cast<std::uint32_t>(out_.ends.size());
+                const auto from = corners[i], to = corners[(i + 1) % 3];
+                out_.ends.push_back({std::min(from, to), std::max(from, to)});
+                out_.triangles.push_back({t, no_element});
+                out_.sides.push_back(1);
+            } else if (++out_.sides[e] == 2) {
+                out_.triangles[e][1] = t;
+            }
+            own[i] = e;
+        }
+    }
+    MeshEdges take() { return std::move(out_); }
+
+private:
+    std::vector<std::uint32_t> number_;  // of each side that has been named
+    MeshEdges out_;
+};
+
+}  // namespace
 
 std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
                                                        std::size_t most_vertices) {
@@ -228,11 +283,12 @@ std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, 
     std::vector<Vector3d> flat;
     for (const auto p : base.positions) flat.push_back(to_vector(p));
     std::vector<std::uint32_t> split, vertex_of_edge;
+    // Two triangles that lie on each other have edges of their own from the first level on.
+    auto edges = depth.levels > 0 ? find_edges(flat.size(), base.triangles) : MeshEdges{};
     for (std::uint32_t k = 1; k <= depth.levels; ++k) {
         const std::span<const Triangle> triangles = out.empty() ? base.triangles : out.back().triangles;
         SubdivisionLevel level;
         level.first = static_cast<std::uint32_t>(flat.size());
-        const auto edges = find_edges(flat.size(), triangles);
         const double longest = static_cast<double>(std::int64_t{depth.longest_edge} << (depth.levels - k));
         split.clear();
         vertex_of_edge.assign(edges.size(), no_element);
@@ -248,6 +304,8 @@ std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, 
         for (std::uint32_t e = 0; e < edges.size(); ++e)
             if (vertex_of_edge[e] != no_element) cut += edges.sides[e];
         if (cut > 4 * most_vertices) return std::nullopt;
+        level.beside.reserve(split.size());
+        flat.reserve(flat.size() + split.size());
         level.stencils = edge_stencils(flat.size(), triangles, edges, split);
         for (const auto own : split) {
             std::array<std::uint32_t, 4> beside{no_element, no_element, no_element, no_element};
@@ -260,7 +318,21 @@ std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, 
             level.beside.push_back(beside);
         }
         for (const auto e : split) flat.push_back((flat[edges.ends[e][0]] + flat[edges.ends[e][1]]) * 0.5);
-        level.triangles = split_triangles(triangles, edges, vertex_of_edge, flat);
+        level.triangles.reserve(cut);
+        if (k == depth.levels) {
+            cut_triangles(triangles, edges, vertex_of_edge, flat,
+                          [&](const Triangle& corners, const std::array<std::uint32_t, 3>&) {
+                              level.triangles.push_back(corners);
+                          });
+        } else {
+            EdgesOfParts next(edges, triangles.size(), cut);
+            cut_triangles(triangles, edges, vertex_of_edge, flat,
+                          [&](const Triangle& corners, const std::array<std::uint32_t, 3>& sides) {
+                              level.triangles.push_back(corners);
+                              next.add(corners, sides);
+                          });
+            edges = next.take();
+        }
         out.push_back(std::move(level));
     }
     return out;

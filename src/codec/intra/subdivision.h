@@ -66,12 +66,6 @@ Vector3d tangents_offset(std::span<const LatticePoint> positions, std::span<cons
 Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                          const EdgeStencil& stencil, const SubdivisionRule& rule);
 
-// The triangles after the edges with a new vertex are split, in the order of those that they are cut from. places: of
-// all vertices, old and new. vertex_of_edge: the number of each edge's new vertex, or no_element. Where two sides are
-// split, the quadrangle that remains is cut along its shorter diagonal.
-std::vector<Triangle> split_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
-                                      std::span<const std::uint32_t> vertex_of_edge, std::span<const Vector3d> places);
-
 struct SubdivisionLevel {
     std::uint32_t first = 0;            // the number of its first new vertex
     std::vector<EdgeStencil> stencils;  // of each new vertex
@@ -90,8 +84,9 @@ struct SubdivisionDepth {
 inline constexpr std::uint32_t most_levels = 8;
 
 // All levels of a base mesh. They follow from the base alone, not from how its surface is moved: lengths are those on
-// the base's flat triangles. base: on the lattice, indices in range. Nothing if there would be more vertices than
-// these.
+// the base's flat triangles. Where two sides of a triangle are split, the quadrangle that remains is cut along its
+// diagonal that is shorter there. Triangles follow in the order of those that they are cut from. base: on the lattice,
+// indices in range. Nothing if there would be more vertices than these.
 std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
                                                        std::size_t most_vertices);
 

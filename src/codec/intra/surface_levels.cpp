@@ -1,10 +1,14 @@
 #include "codec/intra/surface_levels.h"
 
 #include "codec/intra/surface_levels_walk.h"
+#include "core/bytes.h"
 #include "entropy/range_coder.h"
 
 namespace htvm::internal {
 namespace {
+
+constexpr std::uint64_t most_in_header = 1 << 20;  // of the longest edge and of the step
+constexpr std::uint64_t most_run = 1 << 30;        // bytes
 
 // The class of a magnitude or of a sum of some, growing with its logarithm.
 std::size_t magnitude_class(std::uint64_t quarters, std::size_t classes) {
@@ -43,28 +47,6 @@ LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, 
     return {along(0), along(1), along(2)};
 }
 
-ExpectedLevel expected_base(const LatticeMesh& base) {
-    ExpectedLevel out;
-    for (const auto p : base.positions) out.at.push_back(to_vector(p));
-    out.normal = vertex_normals(base.positions, base.triangles);
-    out.bent.assign(out.at.size(), 0);
-    return out;
-}
-
-ExpectedLevel expected_level(const SubdivisionLevel& level, std::span<const LatticePoint> positions,
-                             std::span<const Triangle> triangles, const SubdivisionRule& rule) {
-    ExpectedLevel out;
-    out.above = vertex_normals(positions, triangles);
-    const auto& normals = out.above;
-    for (const auto& stencil : level.stencils) {
-        out.at.push_back(expected_vertex(positions, normals, stencil, rule));
-        out.normal.push_back(normalised(normals[stencil.a] + normals[stencil.b]));
-        const Vector3d off = out.at.back() - (to_vector(positions[stencil.a]) + to_vector(positions[stencil.b])) * 0.5;
-        out.bent.push_back(dot(off, off));
-    }
-    return out;
-}
-
 DisplacementContext displacement_context(const SubdivisionLevel& level, std::size_t i, std::uint32_t number,
                                          std::span<const std::int32_t> values, double bent, std::uint32_t step) {
     DisplacementContext out;
@@ -95,27 +77,74 @@ DisplacementContext displacement_context(const SubdivisionLevel& level, std::siz
     return out;
 }
 
-Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> run, const LatticeMesh& base,
-                                             std::size_t most_vertices) {
-    RangeDecoder decoder(run);
-    ReadingCoder<RangeDecoder> coder{decoder};
-    const auto levels = code_levels_header(coder, {});
-    auto subdivision = subdivide(base, levels.depth, most_vertices);
+std::vector<std::uint8_t> write_surface_levels(const SurfaceLevels& levels,
+                                               std::span<const std::vector<std::uint8_t>> runs) {
+    ByteWriter out;
+    out.u8(static_cast<std::uint8_t>(levels.depth.levels | (levels.coarser - 1) << 4));
+    out.varint(levels.depth.longest_edge - 1);
+    out.varint(levels.step - 1);
+    for (std::uint32_t k = 0; k < levels.depth.levels; ++k)
+        out.u8(static_cast<std::uint8_t>(levels.rules[k].butterfly | levels.rules[k].tangents << 4));
+    for (const auto& run : runs) out.varint(run.size());
+    for (const auto& run : runs) out.bytes(run);
+    return out.take();
+}
+
+Result<SurfaceLevelsHeader> read_levels_header(std::span<const std::uint8_t> payload) {
+    ByteReader in(payload);
+    SurfaceLevelsHeader out;
+    auto& levels = out.levels;
+    const std::uint32_t first = in.u8();
+    levels.depth.levels = first & 15;
+    levels.coarser = (first >> 4) + 1;
+    const std::uint64_t longest = in.varint(), step = in.varint();
+    if (levels.depth.levels > most_levels || longest >= most_in_header || step >= most_in_header)
+        return fail(ErrorKind::corrupt_stream, "surface levels: a number is out of range");
+    levels.depth.longest_edge = static_cast<std::uint32_t>(longest) + 1;
+    levels.step = static_cast<std::uint32_t>(step) + 1;
+    for (std::uint32_t k = 0; k < levels.depth.levels; ++k) {
+        const std::uint32_t rule = in.u8();
+        levels.rules[k] = {rule & 15, rule >> 4};
+    }
+    std::array<std::uint64_t, most_levels + 1> sizes{};
+    for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) {
+        sizes[k] = in.varint();
+        if (sizes[k] > most_run) return fail(ErrorKind::corrupt_stream, "surface levels: a run is too long");
+    }
+    if (!in.ok()) return fail(ErrorKind::corrupt_stream, "surface levels: the header is cut off");
+    std::size_t end = out.first_run = in.position();
+    for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) out.ends[k] = end += static_cast<std::size_t>(sizes[k]);
+    if (payload.size() > end) return fail(ErrorKind::corrupt_stream, "surface levels: bytes follow the last run");
+    return out;
+}
+
+Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> payload, const LatticeMesh& base,
+                                             std::size_t most_vertices, std::uint32_t down_to) {
+    const auto header = read_levels_header(payload);
+    if (!header) return tl::unexpected(header.error());
+    const auto& levels = header->levels;
+    const std::uint32_t last = std::min(down_to, levels.depth.levels);
+    if (payload.size() < header->ends[last]) return fail(ErrorKind::corrupt_stream, "surface levels: a run is cut off");
+    // The first levels are those of a surface that has no more.
+    auto subdivision =
+        subdivide(base, {last, levels.depth.longest_edge << (levels.depth.levels - last)}, most_vertices);
     if (!subdivision) return fail(ErrorKind::limit, "surface levels: more vertices than may be decoded");
     LeveledSurface out;
     std::vector<std::int32_t> values;
     DisplacementModels models;
-    const auto nothing = [](std::size_t, const DisplacementContext&) { return 0; };
-    code_displacements(coder, models, nullptr, 0, expected_base(base), step_at(levels, 0), out.positions, values,
-                       nothing);
-    out.triangles = base.triangles;
-    for (std::uint32_t k = 1; k <= levels.depth.levels && !decoder.exhausted(); ++k) {
-        auto& level = (*subdivision)[k - 1];
-        const auto expected = expected_level(level, out.positions, out.triangles, levels.rules[k - 1]);
-        code_displacements(coder, models, &level, k, expected, step_at(levels, k), out.positions, values, nothing);
-        out.triangles = std::move(level.triangles);
+    std::size_t begin = header->first_run;
+    for (std::uint32_t k = 0; k <= last; ++k) {
+        RangeDecoder decoder(payload.subspan(begin, header->ends[k] - begin));
+        begin = header->ends[k];
+        ReadingCoder<RangeDecoder> coder{decoder};
+        auto* level = k > 0 ? &(*subdivision)[k - 1] : nullptr;
+        const auto expected =
+            level ? ExpectedLevel(*level, out.positions, out.triangles, levels.rules[k - 1]) : ExpectedLevel(base);
+        code_displacements(coder, models, level, k, expected, step_at(levels, k), out.positions, values,
+                           [](std::size_t, const DisplacementContext&) { return 0; });
+        out.triangles = level ? std::move(level->triangles) : base.triangles;
+        if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "surface levels: a run ends too early");
     }
-    if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "surface levels: the run ends too early");
     return out;
 }
 

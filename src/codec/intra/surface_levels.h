@@ -5,10 +5,13 @@
 // Where the surface is smooth a vertex costs a few hundredths of a bit: connectivity is not coded at all, and most
 // displacements are zero in contexts that say so.
 //
-// Run: the header's numbers, then the displacements of the base's vertices, then those of each level in the order of
-// its edges.
+// Payload: a header, then the run of the base's displacements, then one of each level's in the order of its edges. The
+// header says how long each run is, so a payload may be cut behind any, and what is left gives the levels up to there.
+// Contexts go on from run to run.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -39,10 +42,24 @@ struct LeveledSurface {
     std::vector<Triangle> triangles;
 };
 
-// The surface that was encoded. base: its positions are on the lattice, its indices in range. most_vertices: of the
-// finest level. Errors: corrupt_stream if the run ends too early or its numbers are out of range; limit if there would
-// be more vertices.
-Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> run, const LatticeMesh& base,
-                                             std::size_t most_vertices);
+// What a payload's header says.
+struct SurfaceLevelsHeader {
+    SurfaceLevels levels;
+    // Where the run of the base's displacements begins in the payload, and where that of each level ends, the base's
+    // first.
+    std::size_t first_run = 0;
+    std::array<std::size_t, most_levels + 1> ends{};
+};
+
+// Errors: corrupt_stream if the header is cut off, its numbers are out of range, or bytes follow the last run. Runs may
+// be missing.
+Result<SurfaceLevelsHeader> read_levels_header(std::span<const std::uint8_t> payload);
+
+// The surface that was encoded, down to a level, or to the finest if there are fewer: 0 gives the base, moved. The
+// vertices of these levels lie where they lie in the whole surface; what comes behind their runs is not read, and may
+// be missing. base: its positions are on the lattice, its indices in range. most_vertices: of the level asked for.
+// Errors: those of the header; corrupt_stream if a run is cut off; limit if there would be more vertices.
+Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> payload, const LatticeMesh& base,
+                                             std::size_t most_vertices, std::uint32_t down_to = most_levels);
 
 }  // namespace htvm::internal

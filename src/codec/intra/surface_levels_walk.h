@@ -89,31 +89,48 @@ std::int32_t code_displacement(Coder& coder, DisplacementModels& m, const Displa
     return negative ? -magnitude : magnitude;
 }
 
-// Codes the header's numbers.
-template <class Coder>
-SurfaceLevels code_levels_header(Coder& coder, const SurfaceLevels& wanted) {
-    SurfaceLevels out;
-    out.depth.levels = std::min(coder.raw(wanted.depth.levels, 4), most_levels);
-    out.depth.longest_edge = coder.raw(wanted.depth.longest_edge - 1, 20) + 1;
-    out.step = coder.raw(wanted.step - 1, 20) + 1;
-    out.coarser = coder.raw(wanted.coarser - 1, 4) + 1;
-    for (std::uint32_t k = 0; k < out.depth.levels; ++k) {
-        out.rules[k].butterfly = coder.raw(wanted.rules[k].butterfly, 4);
-        out.rules[k].tangents = coder.raw(wanted.rules[k].tangents, 4);
-    }
-    return out;
-}
+// The payload of these runs, of the base's displacements first.
+std::vector<std::uint8_t> write_surface_levels(const SurfaceLevels& levels,
+                                               std::span<const std::vector<std::uint8_t>> runs);
 
-// The vertices of a level before they are moved; of the base, where it has them.
-struct ExpectedLevel {
-    std::vector<Vector3d> at, normal;
-    std::vector<double> bent;     // squared, how far off the middle of its edge each is expected; 0 for the base
-    std::vector<Vector3d> above;  // the normals of all vertices of the levels above
+// The vertices of a level before they are moved.
+class ExpectedLevel {
+public:
+    // The base, which must outlive this.
+    explicit ExpectedLevel(const LatticeMesh& base)
+        : positions_(base.positions), normals_(vertex_normals(base.positions, base.triangles)) {}
+    // positions: of the levels above, to which those of this one may be added meanwhile; they and the level outlive
+    // this. triangles: of the level above.
+    ExpectedLevel(const SubdivisionLevel& level, const std::vector<LatticePoint>& positions,
+                  std::span<const Triangle> triangles, const SubdivisionRule& rule)
+        : level_(&level), positions_(positions), rule_(rule), normals_(vertex_normals(positions, triangles)) {}
+
+    std::size_t size() const { return level_ ? level_->stencils.size() : normals_.size(); }
+    struct Vertex {
+        Vector3d at;
+        double bent = 0;  // squared, how far off the middle of its edge it is expected; 0 for the base
+    };
+    Vertex vertex(std::size_t i) const {
+        if (!level_) return {to_vector(positions_[i])};
+        const auto& stencil = level_->stencils[i];
+        const Vector3d at = expected_vertex(positions_, normals_, stencil, rule_);
+        const Vector3d off = at - (to_vector(positions_[stencil.a]) + to_vector(positions_[stencil.b])) * 0.5;
+        return {at, dot(off, off)};
+    }
+    // Along which it is displaced.
+    Vector3d normal(std::size_t i) const {
+        if (!level_) return normals_[i];
+        const auto& stencil = level_->stencils[i];
+        return normalised(normals_[stencil.a] + normals_[stencil.b]);
+    }
+    const std::vector<Vector3d>& normals_above() const { return normals_; }  // of the base, its own
+
+private:
+    const SubdivisionLevel* level_ = nullptr;
+    const std::vector<LatticePoint>& positions_;
+    SubdivisionRule rule_;
+    std::vector<Vector3d> normals_;
 };
-ExpectedLevel expected_base(const LatticeMesh& base);
-// positions: of the levels above. triangles: of the level above.
-ExpectedLevel expected_level(const SubdivisionLevel& level, std::span<const LatticePoint> positions,
-                             std::span<const Triangle> triangles, const SubdivisionRule& rule);
 
 // The context of vertex i of a level. values: quantised displacements of the vertices before it; those of the base
 // count as zero, since what a coarse base leaves says nothing of what is below.
@@ -126,12 +143,16 @@ template <class Coder, class Choose>
 void code_displacements(Coder& coder, DisplacementModels& models, const SubdivisionLevel* level, std::uint32_t number,
                         const ExpectedLevel& expected, std::uint32_t step, std::vector<LatticePoint>& positions,
                         std::vector<std::int32_t>& values, const Choose& choose) {
-    for (std::size_t i = 0; i < expected.at.size(); ++i) {
+    positions.reserve(positions.size() + expected.size());
+    values.reserve(values.size() + expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+        const auto vertex = expected.vertex(i);
         const auto context =
-            level ? displacement_context(*level, i, number, values, expected.bent[i], step) : DisplacementContext{};
+            level ? displacement_context(*level, i, number, values, vertex.bent, step) : DisplacementContext{};
         const auto value = code_displacement(coder, models, context, choose(i, context));
         values.push_back(level ? value : 0);
-        positions.push_back(displaced_vertex(expected.at[i], expected.normal[i], value, step));
+        // Most are not displaced, and then the normal need not be known.
+        positions.push_back(displaced_vertex(vertex.at, value != 0 ? expected.normal(i) : Vector3d{}, value, step));
     }
 }
 
