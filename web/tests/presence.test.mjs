@@ -16,6 +16,7 @@ async function source(path) {
 const { FrameSender } = await source('player/src/frame_sender.ts');
 const { FrameQueue } = await source('player/src/frame_queue.ts');
 const { HtvmMesh } = await source('three/src/htvm_mesh.ts');
+const { facingOf } = await source('player/src/facing.ts');
 
 /** Four vertices, of which `presence` says what is there; the last is far away. */
 function frame(topology, presence, referenceTopology = 1) {
@@ -82,4 +83,12 @@ test('fewer triangles go into the buffers that are there, and texture coordinate
     assert.equal(mesh.geometry.drawRange.count, 6);
     assert.equal(freed, 0);
     assert.equal(mesh.uploads.indices, 3);
+});
+
+test('what is seen from one side faces there, and a closed surface nowhere', () => {
+    const corners = [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1];
+    assert.deepEqual(facingOf(corners, [0, 1, 2]), [0, 0, 1]);
+    assert.deepEqual(facingOf(corners, [0, 2, 1]), [0, 0, -1]);
+    assert.equal(facingOf(corners, [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), null);
+    assert.equal(facingOf(corners, []), null);
 });

@@ -7,6 +7,7 @@ import {
 } from 'three';
 import type { Material } from 'three';
 import type { Axis } from '@htvm/decoder';
+import { facingOf } from './facing.js';
 import type { FrameReport } from './messages.js';
 import type { DecodedPicture } from './pictures.js';
 
@@ -58,6 +59,7 @@ export class StageScene {
     #bounds: Box3 | null = null; // of the first frame, upright, metres, not yet moved onto the floor
     #floor: number | null = null; // height of the floor in the upright mesh, metres
     #home: { distance: number; target: Vector3 } | null = null;
+    #facing = 0; // radians, from where the first frame's surface is seen, if it faces one way
     #followed = new Vector3(); // how far the view has gone with the mesh, along the floor
     #leash = 0; // metres
     #shadowIsOld = true;
@@ -127,7 +129,10 @@ export class StageScene {
         this.#chooseMaterial();
         if (frame.bounds[0] <= frame.bounds[3]) {
             const box = this.#uprightBox(frame.bounds);
-            if (!this.#bounds) this.#standOnFloor(box);
+            if (!this.#bounds) {
+                this.#findFacing(frame);
+                this.#standOnFloor(box);
+            }
             this.#shadow.moveOver(box.translate(this.#stage.position), this.#upright.quaternion, this.#stage.position);
             this.#follow(box.getCenter(new Vector3()));
         }
@@ -145,9 +150,9 @@ export class StageScene {
         else this.mesh.material = this.#clayMaterial;
     }
 
-    /** Back to where the whole is seen, turned as given. */
+    /** Back to where the whole is seen, turned as given from its front. */
     resetView(yaw = 0, pitch = 0.12, distance?: number): void {
-        this.view.yaw = yaw;
+        this.view.yaw = this.#facing + yaw;
         this.view.pitch = pitch;
         if (this.#home) {
             this.view.distance = distance ?? this.#home.distance;
@@ -210,6 +215,13 @@ export class StageScene {
         corner.applyQuaternion(this.#upright.quaternion);
         other.applyQuaternion(this.#upright.quaternion);
         return new Box3().setFromPoints([corner, other]);
+    }
+
+    #findFacing({ positions, indices }: FrameReport): void {
+        const facing = indices && facingOf(positions, indices);
+        if (!facing) return;
+        const { x, z } = new Vector3(...facing).applyQuaternion(this.#upright.quaternion);
+        if (Math.hypot(x, z) > 0.1) this.#facing = Math.atan2(x, z);
     }
 
     #standOnFloor(box: Box3): void {
