@@ -93,9 +93,9 @@ void report(const EncodePlan& plan, const Summary& summary, const RateReport& ra
         tell(layer_table(summary.totals) + reasons_text(summary.totals));
         if (summary.totals.all().bytes[Layer::presence] > 0)
             note(
-                "the first mesh has borders, or is in pieces, as where depth cameras see a person: frames say what is "
-                "there, "
-                "holes that open for a moment are filled, specks are left out (--presence, --fill-holes, --specks)");
+                "the first mesh has borders, or is in pieces, as where depth cameras see a person: frames say what "
+                "is there, holes that open for a moment are filled, specks are left out (--presence, --fill-holes, "
+                "--specks)");
         note(fmt::format("{}: {}, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s",
                          shown_place(plan.output.place), counted(frames, "frame"), bytes, megabits / seconds, fps,
                          static_cast<double>(frames) / summary.encode_seconds));

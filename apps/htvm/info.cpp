@@ -512,14 +512,12 @@ void add_info(CLI::App& app, Run& run) {
         ->check(CLI::Range(0.01, 3600.0))
         ->needs(bitrate);
     command->footer(
-        "Columns: ref is the frame that it refers to; vertices are the decoded mesh's, where surface comes and goes "
-        "with\n"
-        "those that are not there, triangles are those shown; pose is the skeleton (I), transforms are the bones' (EP) "
-        "or the\n"
-        "nodes' (T); fans and distance order are the connectivity's two parts; texcoords are texture coordinates; of\n"
-        "TP-frames tracked is what a T-frame has too, in one, removed what the patch replaces, border where it joins,\n"
-        "and the other columns are the patch's; bpv is the frame's total, with packet and layer headers, counts and\n"
-        "ends of runs (overhead, below). All in bits per vertex of the captured mesh.\n"
+        "Columns: ref is the frame that it refers to; vertices are the decoded mesh's, with those that are not there\n"
+        "where surface comes and goes, and triangles those shown; pose is the skeleton (I), transforms are the bones'\n"
+        "(EP) or the nodes' (T); fans and distance order are the connectivity's two parts; texcoords are texture\n"
+        "coordinates; of TP-frames tracked is what a T-frame has too, in one, removed what the patch replaces, border\n"
+        "where it joins, and the other columns are the patch's; bpv is the frame's total, with packet and layer\n"
+        "headers, counts and ends of runs (overhead, below). All in bits per vertex of the captured mesh.\n"
         "T-frames are decoded to tell their parts; one that cannot be counts as overhead.\n"
         "Decoded positions lie on the lattice; the step of the quality (encode -q) is coarser.\n" +
         reasons_help());

@@ -2,10 +2,13 @@
 // doubles from std::log2, and nothing in a stream requires their last digits to be the same on every machine.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
+#include "entropy/mixing.h"
 #include "entropy/models.h"
 
 namespace htvm::internal {
@@ -20,6 +23,15 @@ inline double decision_cost(const BinaryModel& model, bool bit) {
     }();
     const std::uint32_t p = bit ? model.one : 65536u - model.one;
     return static_cast<double>(table[(p + 8) >> 4]);
+}
+
+// The log odds of a decision predicted from several contexts (entropy/mixing.h), from -2047 to 2047; nothing is
+// adapted.
+template <std::size_t N>
+std::int32_t mixed_log_odds(const Mixer<N>& mixer, const std::array<BinaryModel*, N>& models) {
+    std::int64_t sum = 0;
+    for (std::size_t i = 0; i < N; ++i) sum += std::int64_t{log_odds_table[models[i]->one >> 4]} * mixer.weights[i];
+    return static_cast<std::int32_t>(std::clamp<std::int64_t>(sum >> 16, -2047, 2047));
 }
 
 class CostCounter {

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "core/lattice.h"
 #include "core/parallel.h"
 
 namespace htvm::internal {
@@ -591,6 +592,20 @@ SimplifiedMesh simplify(std::span<const Vector3d> positions, std::span<const Tri
     }
     auto out = compacted(work, !colours.empty());
     for (const auto& simplifier : simplifiers) out.looked_at += simplifier.looked_at;
+    return out;
+}
+
+LatticeMesh simplified_mesh(const LatticeMesh& mesh, const SimplificationOptions& options) {
+    std::vector<Vector3d> points;
+    points.reserve(mesh.positions.size());
+    for (const auto p : mesh.positions) points.emplace_back(p.x, p.y, p.z);
+    auto simple = simplify(points, mesh.triangles, mesh.colours, options);
+    LatticeMesh out;
+    const auto whole = [](double c) { return within_lattice(std::llround(c)); };
+    for (const auto& p : simple.positions) out.positions.push_back({whole(p.x()), whole(p.y()), whole(p.z())});
+    out.triangles = std::move(simple.triangles);
+    const auto level = [](double c) { return static_cast<std::uint8_t>(std::lround(std::clamp(c, 0.0, 255.0))); };
+    for (const auto& c : simple.colours) out.colours.push_back({level(c[0]), level(c[1]), level(c[2])});
     return out;
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/thread.h"
+#include "htvm/lattice_mesh.hpp"
 #include "htvm/mesh.hpp"
 
 namespace htvm::internal {
@@ -40,5 +41,8 @@ struct SimplifiedMesh {
 // stays where it is, so that the time is near-linear for any mesh.
 SimplifiedMesh simplify(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
                         std::span<const Colour> colours, const SimplificationOptions& options);
+
+// The same of a mesh on the lattice, whose positions and colours are rounded; without other attributes.
+LatticeMesh simplified_mesh(const LatticeMesh& mesh, const SimplificationOptions& options);
 
 }  // namespace htvm::internal

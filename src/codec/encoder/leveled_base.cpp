@@ -14,19 +14,11 @@ namespace {
 constexpr std::size_t most_vertices = std::size_t{1} << 24;
 
 LatticeMesh simplified(const LatticeMesh& captured, const LeveledBaseOptions& options, std::span<const float> finer) {
-    std::vector<Eigen::Vector3d> points;
-    points.reserve(captured.positions.size());
-    for (const auto p : captured.positions) points.emplace_back(p.x, p.y, p.z);
     SimplificationOptions simplification;
     simplification.surface_error = options.surface_error.value;
     simplification.finer = finer;
     simplification.threads = options.threads;
-    auto simple = simplify(points, captured.triangles, {}, simplification);
-    LatticeMesh out;
-    const auto whole = [](double c) { return within_lattice(std::llround(c)); };
-    for (const auto& p : simple.positions) out.positions.push_back({whole(p.x()), whole(p.y()), whole(p.z())});
-    out.triangles = std::move(simple.triangles);
-    return out;
+    return simplified_mesh(captured, simplification);
 }
 
 // How far each captured vertex is from the base's subdivided surface where it fits best, in lattice units.

@@ -11,16 +11,6 @@
 namespace htvm::internal {
 namespace {
 
-// Positions and triangles with one vertex at a place: seams are no borders.
-LatticeMesh one_vertex_a_place(const LatticeMesh& captured) {
-    LatticeMesh places;
-    places.positions = captured.positions;
-    const auto merging = find_duplicates(places);
-    auto out = kept_vertices(places, merging.kept);
-    out.triangles = merged_triangles(captured.triangles, merging, false);
-    return out;
-}
-
 // As a header can hold it.
 std::uint32_t in_header(double x) {
     constexpr double most = 1 << 20;
@@ -30,7 +20,10 @@ std::uint32_t in_header(double x) {
 }  // namespace
 
 Result<LeveledIntra> encode_leveled_intra(const LatticeMesh& captured, const LeveledIntraOptions& options) {
-    const auto whole = one_vertex_a_place(captured);
+    LatticeMesh geometry;
+    geometry.positions = captured.positions;
+    geometry.triangles = captured.triangles;
+    const auto whole = welded(geometry, at_same_place(geometry));
     if (whole.triangles.empty()) return fail(ErrorKind::bad_input, "a mesh without triangles has no surface to level");
     const auto sampled = evenly_sampled(whole, options.threads);
     const SubdivisionDepth depth{options.levels, in_header(options.longest_edge * options.step.value)};

@@ -11,43 +11,30 @@ namespace {
 
 constexpr std::size_t most_vertices = std::size_t{1} << 24;
 
-// The bits of a decision predicted from several contexts, without adapting them.
+// The bits of a decision predicted from several contexts.
 template <std::size_t N>
-double mixed_cost(const Mixer<N>& mixer, const std::array<const BinaryModel*, N>& models, bool bit) {
-    std::int64_t sum = 0;
-    for (std::size_t i = 0; i < N; ++i) sum += std::int64_t{log_odds_table[models[i]->one >> 4]} * mixer.weights[i];
-    const auto odds = static_cast<std::int32_t>(std::clamp<std::int64_t>(sum >> 16, -2047, 2047));
+double mixed_cost(const Mixer<N>& mixer, const std::array<BinaryModel*, N>& models, bool bit) {
+    const auto odds = mixed_log_odds(mixer, models);
     return decision_cost(BinaryModel{probability_table[static_cast<std::size_t>(odds + 2047)].coded, 0}, bit);
 }
 
 // The bits of a quantised displacement.
-double cost_of(const DisplacementModels& m, const DisplacementContext& c, std::int32_t value) {
-    using C = DisplacementContext;
-    const auto at_level = [&](std::size_t classes, std::size_t own) { return c.level * classes + own; };
-    double bits = mixed_cost<5>(m.nonzero_mixer[c.level],
-                                {&m.by_beside[at_level(C::besides, c.beside)],
-                                 &m.by_above[at_level(C::aboves, c.above)], &m.by_both[c.beside * C::aboves + c.above],
-                                 &m.by_bend[at_level(C::bends, c.bend)], &m.by_trend[c.trend * C::bends + c.bend]},
-                                value != 0);
+double cost_of(DisplacementModels& m, const DisplacementContext& c, std::int32_t value) {
+    using namespace displacement_detail;
+    double bits = mixed_cost(m.nonzero_mixer[c.level], nonzero(m, c), value != 0);
     if (value == 0) return bits;
-    bits += mixed_cost<2>(
-        m.sign_mixer[c.level],
-        {&m.sign_by_trend[c.level * C::trends + c.trend], &m.sign_by_bend[at_level(C::bends, c.bend)]}, value < 0);
+    bits += mixed_cost(m.sign_mixer[c.level], negative(m, c), value < 0);
     const auto rest = static_cast<std::size_t>(std::abs(value)) - 1;
     for (std::size_t i = 0; i < DisplacementModels::unary && i <= rest; ++i)
-        bits += mixed_cost<3>(
-            m.more_mixer[i],
-            {&m.more_by_beside[at_level(C::besides, c.beside)][i], &m.more_by_above[at_level(C::aboves, c.above)][i],
-             &m.more_by_bend[at_level(C::bends, c.bend)][i]},
-            rest > i);
+        bits += mixed_cost(m.more_mixer[i], more(m, c, i), rest > i);
     if (rest >= DisplacementModels::unary)
         bits += 2 * std::log2(static_cast<double>(rest - DisplacementModels::unary) + 1) + 1;
     return bits;
 }
 
 // The value that is worth its bits, for a displacement of so many steps. weight: of a squared step.
-std::int32_t chosen_value(const DisplacementModels& models, const DisplacementContext& context, double steps,
-                          double weight, double lambda) {
+std::int32_t chosen_value(DisplacementModels& models, const DisplacementContext& context, double steps, double weight,
+                          double lambda) {
     const auto nearest = static_cast<std::int32_t>(std::lround(std::clamp(steps, -1e5, 1e5)));
     std::int32_t best = 0;
     double least = weight * steps * steps + lambda * cost_of(models, context, 0);

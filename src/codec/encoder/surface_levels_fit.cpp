@@ -4,6 +4,17 @@
 #include <cmath>
 
 namespace htvm::internal {
+namespace {
+
+// A rule's shares in expected_vertex(), which is linear in the vertices as long as the normals stay.
+struct RuleShares {
+    double tangents, butterfly;
+};
+RuleShares shares_of(const SubdivisionRule& rule) {
+    return {static_cast<double>(rule.tangents) / 64, static_cast<double>(rule.butterfly) / 128};
+}
+
+}  // namespace
 
 SurfaceIndex evenly_sampled(const LatticeMesh& captured, Threads threads) {
     constexpr std::size_t most_vertices = std::size_t{1} << 22;
@@ -121,13 +132,11 @@ void SurfaceFit::find_samples_back(std::span<const Triangle> triangles) {
         for (const auto v : t) area[v] += part;
     }
     const auto normals = vertex_normals(positions_, triangles);
-    std::vector<Point3f> facing;
-    for (const auto& n : normals) facing.push_back(to_floats(n));
     samples_back_.clear();
     guesses_back_.resize(positions_.size(), OrientedPoints::no_point);
     const auto found =
-        closest_facing(captured_, points_of(positions_), facing, {.reach = reach_, .agreement = options_.agreement},
-                       options_.threads, guesses_back_);
+        closest_facing(captured_, points_of(positions_), points_of(normals),
+                       {.reach = reach_, .agreement = options_.agreement}, options_.threads, guesses_back_);
     for (std::uint32_t v = 0; v < positions_.size(); ++v) {
         if (!found[v].found()) continue;
         const double residual = dot(to_vector(found[v].point) - to_vector(positions_[v]), normals[v]);
@@ -166,8 +175,7 @@ std::vector<Vector3d> SurfaceFit::moved_by(std::span<const double> change) const
     for (std::size_t k = 1; k <= subdivision_.size(); ++k) {
         const auto& level = subdivision_[k - 1];
         const auto& above = above_[k];
-        const double tangents = static_cast<double>(levels_.rules[k - 1].tangents) / 64,
-                     butterfly = static_cast<double>(levels_.rules[k - 1].butterfly) / 128;
+        const auto [tangents, butterfly] = shares_of(levels_.rules[k - 1]);
         for (std::size_t i = 0; i < level.stencils.size(); ++i) {
             const auto& s = level.stencils[i];
             const std::size_t v = level.first + i;
@@ -212,8 +220,7 @@ std::vector<double> SurfaceFit::gradient(std::span<const Vector3d> moved, bool r
     for (std::size_t k = subdivision_.size(); k > 0; --k) {
         const auto& level = subdivision_[k - 1];
         const auto& above = above_[k];
-        const double tangents = static_cast<double>(levels_.rules[k - 1].tangents) / 64,
-                     butterfly = static_cast<double>(levels_.rules[k - 1].butterfly) / 128;
+        const auto [tangents, butterfly] = shares_of(levels_.rules[k - 1]);
         for (std::size_t i = 0; i < level.stencils.size(); ++i) {
             const auto& s = level.stencils[i];
             const std::size_t v = level.first + i;

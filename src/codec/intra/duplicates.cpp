@@ -86,4 +86,16 @@ LatticeMesh kept_vertices(const LatticeMesh& mesh, const std::vector<std::uint32
     return out;
 }
 
+Merging at_same_place(const LatticeMesh& captured) {
+    LatticeMesh places;
+    places.positions = captured.positions;
+    return find_duplicates(places);
+}
+
+LatticeMesh welded(const LatticeMesh& captured, const Merging& same_place) {
+    auto out = kept_vertices(captured, same_place.kept);
+    out.triangles = merged_triangles(captured.triangles, same_place, false);
+    return out;
+}
+
 }  // namespace htvm::internal

@@ -25,4 +25,9 @@ std::vector<Triangle> merged_triangles(const std::vector<Triangle>& triangles, c
 // The vertices that are kept; without triangles.
 LatticeMesh kept_vertices(const LatticeMesh& mesh, const std::vector<std::uint32_t>& kept);
 
+// Which vertices are at the same place. Merged into one, with the colour of the first: else the two sides of a seam, as
+// of a texture chart, would be simplified, or cut, separately, and gaps would open. Triangles keep their order.
+Merging at_same_place(const LatticeMesh& captured);
+LatticeMesh welded(const LatticeMesh& captured, const Merging& same_place);
+
 }  // namespace htvm::internal

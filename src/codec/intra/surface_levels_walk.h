@@ -54,28 +54,39 @@ struct DisplacementModels {
 
 inline constexpr std::int32_t most_displacement = 1 << 20;  // of a quantised one's magnitude
 
+// The models that predict each decision of a displacement.
+namespace displacement_detail {
+
+using C = DisplacementContext;
+inline std::size_t at_level(const C& c, std::size_t classes, std::size_t own) { return c.level * classes + own; }
+
+inline std::array<BinaryModel*, 5> nonzero(DisplacementModels& m, const C& c) {
+    return {&m.by_beside[at_level(c, C::besides, c.beside)], &m.by_above[at_level(c, C::aboves, c.above)],
+            &m.by_both[c.beside * C::aboves + c.above], &m.by_bend[at_level(c, C::bends, c.bend)],
+            &m.by_trend[c.trend * C::bends + c.bend]};
+}
+
+inline std::array<BinaryModel*, 2> negative(DisplacementModels& m, const C& c) {
+    return {&m.sign_by_trend[at_level(c, C::trends, c.trend)], &m.sign_by_bend[at_level(c, C::bends, c.bend)]};
+}
+
+inline std::array<BinaryModel*, 3> more(DisplacementModels& m, const C& c, std::size_t i) {
+    return {&m.more_by_beside[at_level(c, C::besides, c.beside)][i],
+            &m.more_by_above[at_level(c, C::aboves, c.above)][i], &m.more_by_bend[at_level(c, C::bends, c.bend)][i]};
+}
+
+}  // namespace displacement_detail
+
 // Codes a quantised displacement. Coder: as the coders of entropy/models.h, also with a cost counter behind it.
 template <class Coder>
 std::int32_t code_displacement(Coder& coder, DisplacementModels& m, const DisplacementContext& c, std::int32_t wanted) {
-    using C = DisplacementContext;
-    const auto at_level = [&](std::size_t classes, std::size_t own) { return c.level * classes + own; };
-    const std::array<BinaryModel*, 5> nonzero = {
-        &m.by_beside[at_level(C::besides, c.beside)], &m.by_above[at_level(C::aboves, c.above)],
-        &m.by_both[c.beside * C::aboves + c.above], &m.by_bend[at_level(C::bends, c.bend)],
-        &m.by_trend[c.trend * C::bends + c.bend]};
-    if (!code_mixed(coder, m.nonzero_mixer[c.level], nonzero, wanted != 0)) return 0;
-    const std::array<BinaryModel*, 2> signs = {&m.sign_by_trend[c.level * C::trends + c.trend],
-                                               &m.sign_by_bend[at_level(C::bends, c.bend)]};
-    const bool negative = code_mixed(coder, m.sign_mixer[c.level], signs, wanted < 0);
+    using namespace displacement_detail;
+    if (!code_mixed(coder, m.nonzero_mixer[c.level], nonzero(m, c), wanted != 0)) return 0;
+    const bool below_zero = code_mixed(coder, m.sign_mixer[c.level], negative(m, c), wanted < 0);
     const auto rest = static_cast<std::uint32_t>(std::max(std::abs(wanted), 1) - 1);
     std::uint32_t coded = 0;
-    while (coded < DisplacementModels::unary) {
-        const std::array<BinaryModel*, 3> more = {&m.more_by_beside[at_level(C::besides, c.beside)][coded],
-                                                  &m.more_by_above[at_level(C::aboves, c.above)][coded],
-                                                  &m.more_by_bend[at_level(C::bends, c.bend)][coded]};
-        if (!code_mixed(coder, m.more_mixer[coded], more, rest > coded)) break;
+    while (coded < DisplacementModels::unary && code_mixed(coder, m.more_mixer[coded], more(m, c, coded), rest > coded))
         ++coded;
-    }
     if (coded == DisplacementModels::unary) {
         const std::uint32_t left = std::max(rest, coded) - coded + 1;
         const int width = static_cast<int>(std::bit_width(left)) - 1;
@@ -86,7 +97,7 @@ std::int32_t code_displacement(Coder& coder, DisplacementModels& m, const Displa
     }
     const auto magnitude =
         static_cast<std::int32_t>(std::min(coded, static_cast<std::uint32_t>(most_displacement) - 1)) + 1;
-    return negative ? -magnitude : magnitude;
+    return below_zero ? -magnitude : magnitude;
 }
 
 // The payload of these runs, of the base's displacements first.

@@ -1,7 +1,5 @@
 #include "codec/encoder/tracked/captured_surface.h"
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -613,39 +611,17 @@ TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& 
     return out;
 }
 
-Merging at_same_place(const LatticeMesh& captured) {
-    LatticeMesh places;
-    places.positions = captured.positions;
-    return find_duplicates(places);
-}
-
-LatticeMesh welded(const LatticeMesh& captured, const Merging& same_place) {
-    auto out = kept_vertices(captured, same_place.kept);
-    out.triangles = merged_triangles(captured.triangles, same_place, false);
-    return out;
-}
-
 namespace {
 
 LatticeMesh with_fewer_vertices(const LatticeMesh& captured, bool keep_tips,
                                 const SimplifiedReferenceOptions& options) {
-    std::vector<Eigen::Vector3d> points;
-    points.reserve(captured.positions.size());
-    for (const auto p : captured.positions) points.emplace_back(p.x, p.y, p.z);
     SimplificationOptions simplification;
     simplification.surface_error = options.surface_error.value;
     simplification.colour_error = options.colour_error;
     simplification.longest_edge = options.longest_edge.value;
     simplification.keep_tips = keep_tips;
     simplification.threads = options.threads;
-    auto simplified = simplify(points, captured.triangles, captured.colours, simplification);
-    LatticeMesh out;
-    const auto whole = [](double c) { return within_lattice(std::llround(c)); };
-    for (const auto& p : simplified.positions) out.positions.push_back({whole(p.x()), whole(p.y()), whole(p.z())});
-    out.triangles = std::move(simplified.triangles);
-    const auto level = [](double c) { return static_cast<std::uint8_t>(std::lround(std::clamp(c, 0.0, 255.0))); };
-    for (const auto& c : simplified.colours) out.colours.push_back({level(c[0]), level(c[1]), level(c[2])});
-    return out;
+    return simplified_mesh(captured, simplification);
 }
 
 // Takes away parts that are smaller than a square of this side.

@@ -125,9 +125,4 @@ LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex
 LatticeMesh simplified_piece(const LatticeMesh& piece, const LatticeMesh& captured, const SurfaceIndex& surface,
                              const SimplifiedReferenceOptions& options);
 
-// Which vertices are at the same place. Merged into one, with the colour of the first: else the two sides of a seam, as
-// of a texture chart, would be simplified, or cut, separately, and gaps would open. Triangles keep their order.
-Merging at_same_place(const LatticeMesh& captured);
-LatticeMesh welded(const LatticeMesh& captured, const Merging& same_place);
-
 }  // namespace htvm::internal

@@ -266,15 +266,18 @@ std::optional<FrameReason> why_intra(const TrackedWork& work, bool due, std::opt
     return std::nullopt;
 }
 
-// A TP-frame that adds what was captured beside what is tracked; nothing if there is none to add. near: as of
-// code_for_patches().
+// A TP-frame that adds what was captured beside what is tracked; nothing if there is none to add, which in_vain then
+// says. near: as of code_for_patches().
 Result<std::optional<Frame>> grow(const TrackedWork& work, const NodeRegistration& registered, const FrameSteps& steps,
-                                  std::span<const std::uint32_t> near, const VainAttempts& in_vain) {
+                                  std::span<const std::uint32_t> near, VainAttempts& in_vain) {
     auto tracked = code_for_patches(work, registered, steps, near);
     if (!tracked) return tl::unexpected(tracked.error());
     auto patched = patch(work, registered, steps, *tracked, FrameReason::border);
     if (!patched) return tl::unexpected(patched.error());
-    if (!*patched) return std::optional<Frame>();
+    if (!*patched) {
+        in_vain.growth = work.sequence.next_frame;
+        return std::optional<Frame>();
+    }
     (*patched)->in_vain = in_vain;
     return std::optional(Frame(std::move(**patched)));
 }
@@ -307,7 +310,6 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         auto grown = grow(work, *tracking.registered, steps, {}, in_vain);
         if (!grown) return tl::unexpected(grown.error());
         if (*grown) return std::move(**grown);
-        in_vain.growth = work.sequence.next_frame;
     }
 
     // 3. A T-frame, and how well it fits. Behind an I-frame it is not known yet how well its T-frames can fit; where
@@ -323,8 +325,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
 
     // 4. Where tracking is lost: limbs from another start. Where surface comes and goes, what is far off is not shown,
     // so that if there are none a patch may be left to the next frame: this one has taken its time.
-    const bool was_lost = motion->lost.has_value();
-    if (was_lost) {
+    if (motion->lost) {
         tracking.lost = true;
         const bool looks = !just_in_vain(work, in_vain.limbs);
         if (!apart && !looks) tracking.searched_limbs = true;
@@ -338,7 +339,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     // 5. Where it still is, or where much was captured that is not tracked: a patch.
     const auto& tracked = motion->coded.encoded;
     const auto anew = why_anew(work, motion->coded);
-    if (!anew && patches && motion->lost && was_lost) {
+    if (!anew && patches && motion->lost) {
         auto patched = patch(work, *tracking.registered, steps, motion->to_patch(), why_patched(*motion->lost));
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) {
@@ -352,7 +353,6 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         auto grown = grow(work, *tracking.registered, steps, tracked.near, in_vain);
         if (!grown) return tl::unexpected(grown.error());
         if (*grown) return std::move(**grown);
-        in_vain.growth = work.sequence.next_frame;
     }
 
     // 6. The T-frame, or an I-frame: of the tracked mesh, where that is as good.

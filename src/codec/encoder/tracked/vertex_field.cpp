@@ -11,12 +11,11 @@ namespace htvm::internal {
 
 namespace {
 
-// The bits of a decision predicted from several contexts, without adapting them.
+// The bits of a decision predicted from several contexts, for either answer. Near certainty they are fewer than it is
+// coded with, by which streams were decided from the first.
 template <std::size_t N>
 std::array<double, 2> mixed_cost(const Mixer<N>& mixer, const std::array<BinaryModel*, N>& models) {
-    std::int64_t sum = 0;
-    for (std::size_t i = 0; i < N; ++i) sum += std::int64_t{log_odds_table[models[i]->one >> 4]} * mixer.weights[i];
-    const std::int32_t odds = static_cast<std::int32_t>(std::clamp<std::int64_t>(sum >> 16, -2047, 2047));
+    const auto odds = mixed_log_odds(mixer, models);
     const BinaryModel model{static_cast<std::uint16_t>(probability_of_log_odds(odds)), 0};
     return {decision_cost(model, false), decision_cost(model, true)};
 }
