@@ -33,7 +33,7 @@ struct Options {
     CaptureOptions capture;
     std::vector<std::size_t> at{0};
     std::vector<double> qualities{20, 30, 40, 50, 60, 70, 80, 90, 100};
-    std::vector<double> steps{1, 1.4, 1.9, 2.6, 3.5, 4.7};  // mm
+    std::vector<double> steps{0.75, 1, 1.4, 2, 2.6, 3.5};  // mm
     std::vector<double> errors{0.4, 0.8};                   // mm
     std::uint64_t samples = 200000;
     LeveledIntraOptions levels;
@@ -67,7 +67,7 @@ Result<Point::Shown> shown_down_to(const LeveledIntra& coded, std::uint32_t leve
     constexpr std::size_t times = 31;
     const auto header = read_levels_header(coded.levels.payload);
     if (!header) return tl::unexpected(header.error());
-    const auto runs = std::span(coded.levels.payload).first(header->ends[level]);
+    const auto runs = std::span(coded.levels.payload).first(header->ends[std::min(level, header->levels.depth.levels)]);
     std::vector<double> taken;
     for (std::size_t i = 0; i < times; ++i) {
         const auto begin = std::clock();
@@ -123,7 +123,7 @@ Result<Point> leveled_point(const Mesh& mesh, double step, const Options& option
     const auto& levels = coded->levels;
     const auto again = decode_surface_levels(levels.payload, coded->decoded_base, levels.surface.positions.size());
     if (!again) return tl::unexpected(again.error());
-    if (again->positions != levels.surface.positions || again->triangles != levels.surface.triangles)
+    if (again->positions != levels.surface.positions || again->finest() != levels.surface.finest())
         return fail(ErrorKind::corrupt_stream, "what is decoded is not what was encoded");
     Point out;
     out.setting = fmt::format("step {:g}", step);
@@ -141,7 +141,7 @@ Result<Point> leveled_point(const Mesh& mesh, double step, const Options& option
     }
     LatticeMesh shown;
     shown.positions = levels.surface.positions;
-    shown.triangles = levels.surface.triangles;
+    shown.triangles = levels.surface.finest();
     return measured(std::move(out), mesh, to_mesh(shown, lattice), options);
 }
 
@@ -265,33 +265,38 @@ void add_hierarchy(CLI::App& app, app::Run& run) {
         ->delimiter(',')
         ->check(CLI::Range(0.0, 100.0));
     command
-        ->add_option("--steps", options->steps, "Steps of the finest displacements, mm (default 1,1.4,1.9,2.6,3.5,4.7)")
+        ->add_option("--steps", options->steps, "Steps of the finest displacements, mm (default 0.75,1,1.4,2,2.6,3.5)")
         ->delimiter(',')
         ->check(CLI::Range(0.01, 100.0));
     command->add_option("--errors", options->errors, "Errors (M2, mm) at which bytes are compared (default 0.4,0.8)")
         ->delimiter(',');
     command->add_option("--samples", options->samples, "Samples of M2 in each direction (default 200000)");
-    command->add_option("--levels", levels.levels, "Levels below the base (default 3)")
+    command->add_option("--levels", levels.levels, "Levels below the base that are coded (default 2)")
         ->check(CLI::Range(0u, most_levels));
-    command->add_option("--base-error", levels.base_error, "Error of the base, in steps (default 1.8)")
+    command->add_option("--base-error", levels.base_error, "Error of the base, in steps (default 2.4)")
         ->check(CLI::Range(0.01, 100.0));
-    command->add_option("--base-step", levels.base_step, "Step of the base's positions, in steps (default 3.3)")
+    command->add_option("--base-step", levels.base_step, "Step of the base's positions, in steps (default 4.4)")
         ->check(CLI::Range(0.01, 100.0));
     command
         ->add_option("--base-again", levels.base_again,
                      "How often the base is made finer where much is left (default 1)")
         ->check(CLI::Range(0, 10));
     command
-        ->add_option("--longest-edge", levels.longest_edge, "Longest edge of the finest level, in steps (default 3.7)")
+        ->add_option("--longest-edge", levels.longest_edge, "Longest edge of the finest coded level, in steps (default 9.9)")
         ->check(CLI::Range(0.01, 1000.0));
     command->add_option("--coarser", levels.coarser, "A level's step in sixteenths of that below (default 12)")
         ->check(CLI::Range(1u, 16u));
+    command
+        ->add_option("--rounded", levels.rounded,
+                     "Bend from which the level behind those that are coded splits an edge, in steps (default 0.19; 0: "
+                     "no such level)")
+        ->check(CLI::Range(0.0, 7.9));
     command->add_option("--butterfly", levels.rule.butterfly, "Eighths of the butterfly rule (default 2)")
         ->check(CLI::Range(0u, 15u));
     command->add_option("--tangents", levels.rule.tangents, "Eighths of the tangent planes' rule (default 8)")
         ->check(CLI::Range(0u, 15u));
-    command->add_option("--lambda", levels.lambda, "Squared steps that a bit must spare (default 0.06)");
-    command->add_option("--least-moved", levels.least_moved, "Least displacement, in steps (default 0.7)");
+    command->add_option("--lambda", levels.lambda, "Squared steps that a bit must spare (default 0.107)");
+    command->add_option("--least-moved", levels.least_moved, "Least displacement, in steps (default 0.93)");
     command->add_flag("--json", options->json, "Print the result as JSON on standard output");
     command->footer(
         "Geometry alone, without the noise filter. One step says how fine everything is. Displacements are those of\n"

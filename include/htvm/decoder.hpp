@@ -43,6 +43,9 @@ struct DecoderOptions {
     // an upper bound from the counts of vertices and triangles: about 1 KB per vertex of an ordinary mesh. A plugged-in
     // coder of I-frames uses its own memory in addition.
     std::uint64_t max_memory = std::uint64_t{1} << 32;
+    // How many levels of detail are shown below the mesh that frames refer to, where a stream has any; with fewer, a
+    // frame takes less time and has fewer vertices.
+    std::uint32_t detail_levels = 9;
     unsigned threads = 0;  // that work at the same time; 0: one per core. The meshes are the same for any number
     TaskRunner runner;     // provides the threads; empty: the decoder has a pool of its own
     std::optional<ExternalIntraCoder> intra_coder;  // decodes I-frames of another coder; none: they are unsupported
@@ -125,6 +128,8 @@ public:
     // for callers with time to spare between two frames. It changes no frame, and a frame on loan stays. It may be left
     // out; the next frame then takes longer.
     void prepare();
+    // Sets DecoderOptions::detail_levels for the frames to come.
+    void set_detail_levels(std::uint32_t levels);
     // Known once a sequence header has been decoded.
     const std::optional<SequenceInfo>& sequence() const;
 

@@ -46,6 +46,14 @@ enum class TrackedReferences : std::uint8_t {
                // refers to the reference alone
 };
 
+// Whether the meshes that T-frames refer to are coded as a base mesh, subdivided, with detail as displacements. They take
+// about half the bits, and a second or more of encoding each.
+enum class ReferenceLevels : std::uint8_t {
+    automatic,  // from effort 3 on, where surface does not come and go and there is no texture
+    off,
+    on,  // likewise, at any effort
+};
+
 // Whether surface comes and goes, as where depth cameras see a person from some sides: then frames say what is there.
 enum class SurfacePresence : std::uint8_t {
     automatic,  // by the first mesh: if it has borders
@@ -90,6 +98,7 @@ struct TrackedOptions {
     double patch_share = 0.3;  // where tracking is lost, the largest share of the mesh that a patch may replace; where
                                // more is lost, an I-frame is sent; 0: always
     Denoising denoise = Denoising::automatic;  // with a target error always off: that is measured against the capture
+    ReferenceLevels levels = ReferenceLevels::automatic;
     SurfacePresence presence = SurfacePresence::automatic;
     HoleFilling fill = HoleFilling::automatic;  // where surface comes and goes
     Specks specks = Specks::automatic;          // likewise

@@ -59,6 +59,7 @@ enum class Layer : std::uint8_t {
     charts = 15,    // how triangles lie in the texture's picture
     presence = 16,  // which vertices are there
     reason = 17,    // why the encoder sent the frame: a FrameReason
+    levels = 18,    // of the surface of a base mesh
 };
 
 struct LayerName {
@@ -83,6 +84,7 @@ inline constexpr std::array frame_layers = {
     LayerName{Layer::charts, "charts"},
     LayerName{Layer::presence, "presence"},
     LayerName{Layer::reason, "reason"},
+    LayerName{Layer::levels, "levels"},
 };
 inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // the largest number plus one; 0 is not a layer
 

@@ -1,4 +1,4 @@
-#include "codec/intra/subdivision.h"
+#include "codec/reference/subdivision.h"
 
 #include <gtest/gtest.h>
 

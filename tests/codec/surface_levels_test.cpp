@@ -70,7 +70,7 @@ TEST(SurfaceLevels, any_displacements_on_any_mesh_come_back_to_the_bit) {
         const auto decoded = decode_surface_levels(payload.bytes, base, 20000);
         ASSERT_TRUE(decoded) << decoded.error().message;
         ASSERT_EQ(decoded->positions, payload.surface.positions);
-        ASSERT_EQ(decoded->triangles, payload.surface.triangles);
+        ASSERT_EQ(decoded->finest(), payload.surface.finest());
         for (const auto p : decoded->positions) ASSERT_TRUE(on_lattice(p));
         ++seed;
     }
@@ -94,7 +94,7 @@ TEST(SurfaceLevels, fewer_levels_are_the_first_ones_of_the_whole_and_need_their_
                 k == 0 ? base.positions.size() : (*subdivision)[k - 1].first + (*subdivision)[k - 1].stencils.size();
             ASSERT_EQ(first->positions, std::vector(whole.surface.positions.begin(),
                                                     whole.surface.positions.begin() + std::ptrdiff_t(vertices)));
-            ASSERT_EQ(first->triangles, k == 0 ? base.triangles : (*subdivision)[k - 1].triangles);
+            ASSERT_EQ(first->finest(), k == 0 ? base.triangles : (*subdivision)[k - 1].triangles);
             auto garbled = whole.bytes;
             for (std::size_t i = read_levels_header(whole.bytes)->ends[k]; i < garbled.size(); ++i) garbled[i] ^= 0x5A;
             const auto same = decode_surface_levels(garbled, base, 1 << 20, k);
@@ -221,7 +221,7 @@ TEST(LeveledIntra, the_decoder_has_what_the_encoder_says) {
     const auto decoded = decode_surface_levels(coded->levels.payload, *base, 1 << 20);
     ASSERT_TRUE(decoded);
     EXPECT_EQ(decoded->positions, coded->levels.surface.positions);
-    EXPECT_EQ(decoded->triangles, coded->levels.surface.triangles);
+    EXPECT_EQ(decoded->finest(), coded->levels.surface.finest());
 }
 
 TEST(LeveledIntra, a_finer_step_comes_nearer_for_more_bytes) {
@@ -232,7 +232,7 @@ TEST(LeveledIntra, a_finer_step_comes_nearer_for_more_bytes) {
         const auto coded = encode_leveled_intra(captured, {.step = LatticeUnits(step)});
         ASSERT_TRUE(coded);
         const auto& surface = coded->levels.surface;
-        const double now = rms_between(captured.positions, surface.positions, surface.triangles);
+        const double now = rms_between(captured.positions, surface.positions, surface.finest());
         EXPECT_LT(now, 0.5 * step);
         EXPECT_LT(now, error);
         EXPECT_GT(coded->levels.payload.size(), bytes);
@@ -249,7 +249,7 @@ TEST(LeveledIntra, it_takes_fewer_bytes_than_an_intra_frame_that_is_as_near) {
     const auto coded = encode_leveled_intra(captured, {.step = LatticeUnits(12)});
     ASSERT_TRUE(coded);
     const auto& surface = coded->levels.surface;
-    EXPECT_LT(rms_between(captured.positions, surface.positions, surface.triangles),
+    EXPECT_LT(rms_between(captured.positions, surface.positions, surface.finest()),
               1.2 * rms_between(captured.positions, intra->positions, intra->triangles));
     EXPECT_LT(write_frame_payload(coded->base).size() + coded->levels.payload.size(),
               write_frame_payload(payload).size() / 2);
@@ -268,7 +268,7 @@ TEST(LeveledIntra, seams_are_closed_and_a_mesh_without_triangles_is_refused) {
     const auto coded = encode_leveled_intra(cut, {.step = LatticeUnits(30)});
     ASSERT_TRUE(coded);
     const auto& surface = coded->levels.surface;
-    for (const auto sides : find_edges(surface.positions.size(), surface.triangles).sides) ASSERT_EQ(sides, 2u);
+    for (const auto sides : find_edges(surface.positions.size(), surface.finest()).sides) ASSERT_EQ(sides, 2u);
     LatticeMesh points;
     points.positions = whole.positions;
     const auto refused = encode_leveled_intra(points, {});
@@ -288,7 +288,7 @@ TEST(LeveledIntra, a_border_stays_where_it_is) {
     const auto coded = encode_leveled_intra(sheet, {.step = LatticeUnits(5)});
     ASSERT_TRUE(coded);
     const auto& surface = coded->levels.surface;
-    EXPECT_LT(rms_between(sheet.positions, surface.positions, surface.triangles), 15);
+    EXPECT_LT(rms_between(sheet.positions, surface.positions, surface.finest()), 15);
     EXPECT_LT(rms_between(surface.positions, sheet.positions, sheet.triangles), 15);
 }
 

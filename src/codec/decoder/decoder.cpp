@@ -73,9 +73,34 @@ void show_part(ShownFrame& shown, const TexturedSurface* textured, std::span<con
     shown.triangles = shown.own_triangles;
 }
 
+// The mesh as it is shown: with the detail that is asked for, where it has any.
+LatticeMeshView with_detail(DecoderState& state, const LatticeMeshView& mesh) {
+    if (!mesh.detail || mesh.detail->empty() || state.options.detail_levels == 0) return mesh;
+    const auto& detail = *mesh.detail;
+    const auto levels = std::min<std::size_t>(state.options.detail_levels, detail.levels.size());
+    auto& fine = state.shown.fine;
+    auto& presence = state.shown.fine_presence;
+    fine.positions.assign(mesh.positions.begin(), mesh.positions.end());
+    fine.colours.assign(mesh.colours.begin(), mesh.colours.end());
+    fine.normals.assign(mesh.normals.begin(), mesh.normals.end());
+    presence.assign(mesh.presence.begin(), mesh.presence.end());
+    add_detail(detail, levels, mesh.triangles, fine.positions);
+    add_detail(detail, levels, fine.colours);
+    add_detail(detail, levels, fine.normals);
+    add_detail(detail, levels, presence);
+    auto out = mesh;
+    out.positions = fine.positions;
+    out.triangles = detail.triangles(levels);
+    out.colours = fine.colours;
+    out.normals = fine.normals;
+    out.presence = presence;
+    return out;
+}
+
 }  // namespace
 
-void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t reference_topology, Pose pose) {
+void show(DecoderState& state, const LatticeMeshView& coded, std::uint32_t reference_topology, Pose pose) {
+    const auto mesh = with_detail(state, coded);
     const auto& lattice = state.header->lattice;
     const auto* textured = mesh.textured && !mesh.textured->empty() ? mesh.textured : nullptr;
     const auto presence = anything_absent(mesh.presence) ? mesh.presence : std::span<const std::uint8_t>();
@@ -392,6 +417,13 @@ void Decoder::prepare() {
         return true;
     };
     (void)within_memory(derived, [] { return false; });
+}
+
+void Decoder::set_detail_levels(std::uint32_t levels) {
+    auto& state = *state_;
+    if (levels == state.options.detail_levels) return;
+    state.options.detail_levels = levels;
+    if (state.reference && !state.reference->detail.empty()) state.reference_topology = new_topology(state);
 }
 
 const std::optional<SequenceInfo>& Decoder::sequence() const { return state_->info; }

@@ -27,6 +27,7 @@ struct LatticeMeshView {
     std::span<const QuantisedTexcoord> texcoords;
     const TexturedSurface* textured = nullptr;  // how it is shown where the stream has charts
     std::span<const std::uint8_t> presence{};   // one per vertex, or none: all are there
+    const SurfaceDetail* detail = nullptr;      // that it is shown with
 };
 inline LatticeMeshView view_of(const LatticeMesh& mesh, const TexturedSurface* textured = nullptr) {
     return {mesh.positions, mesh.triangles, mesh.colours, mesh.normals, mesh.texcoords, textured};
@@ -36,6 +37,7 @@ inline LatticeMeshView view_of(const LatticeMesh& mesh, const TexturedSurface* t
 inline LatticeMeshView view_of(const Reference& reference) {
     auto out = view_of(reference.mesh(), &reference.textured);
     out.presence = reference.presence;
+    out.detail = &reference.detail;
     return out;
 }
 
@@ -53,6 +55,8 @@ struct ShownFrame {
     std::vector<Colour> own_colours;      // where vertices are repeated
     std::vector<Triangle> own_triangles;  // where some are not there
     Presence presence;                    // one per vertex; none: all are there
+    LatticeMesh fine;                     // what is shown of a mesh with detail; its triangles are the detail's
+    Presence fine_presence;
     LatticeMesh own;                      // the mesh of a frame that shares nothing with its reference
     Pose pose;
 };
@@ -94,6 +98,7 @@ struct DecodedNodes {
 struct UnreferredIntra {
     std::uint32_t frame = 0, topology = 0;
     LatticeMesh mesh;
+    SurfaceDetail detail;
     TexturedSurface textured;
     Pose pose;
 };

@@ -39,7 +39,7 @@ void show_tracked(DecoderState& state, const DecodedTrackedFrame& frame, Pose po
     const auto& mesh = state.reference->mesh();
     show(state,
          {frame.positions, mesh.triangles, frame.colours, frame.normals, mesh.texcoords, &state.reference->textured,
-          frame.state.presence},
+          frame.state.presence, &state.reference->detail},
          state.reference_topology, std::move(pose));
 }
 

@@ -19,16 +19,18 @@ std::uint8_t flags_of(const CodedFrame& frame) {
                                      (frame.of_tracked_mesh ? packet_flag::of_tracked_mesh : 0));
 }
 
-ShownMesh shown(CodedFrame& frame, const TexturedSurface* of_reference) {
-    const bool own = rules_of(frame.type).codes_mesh || !of_reference;
-    const auto& textured = own ? frame.textured : *of_reference;
+ShownMesh shown(CodedFrame& frame, const Reference* reference) {
+    const bool own = rules_of(frame.type).codes_mesh || !reference;
+    const auto& textured = own ? frame.textured : reference->textured;
+    const auto& detail = detail_of(frame, reference);
     ShownMesh out;
     if (textured.empty())
-        out.mesh = std::move(frame.decoded);
+        out.mesh = detailed(detail, std::move(frame.decoded));
     else
         out = {shown_mesh(frame.decoded, textured), textured.copied};
     if (!anything_absent(frame.presence)) return out;
     auto presence = frame.presence;
+    add_detail(detail, detail.levels.size(), presence);
     for (const auto v : out.repeated) presence.push_back(presence[v]);
     const auto whole = std::move(out.mesh.triangles);
     triangles_shown(whole, presence, out.mesh.triangles);
@@ -48,11 +50,17 @@ FrameType rate_type(const CodedFrame& frame) {
     return frame.stands_in || bare ? FrameType::predicted : frame.type;
 }
 
-OutgoingFrame outgoing(const Configuration& configuration, CodedFrame frame, const TexturedSurface* of_reference,
+const SurfaceDetail& detail_of(const CodedFrame& frame, const Reference* reference) {
+    static const SurfaceDetail none;
+    if (frame.type == FrameType::tracked) return reference ? reference->detail : none;
+    return frame.detail;
+}
+
+OutgoingFrame outgoing(const Configuration& configuration, CodedFrame frame, const Reference* reference,
                        std::uint32_t number, std::int64_t timestamp_us, const FrameCost& cost) {
     OutgoingFrame out;
     out.cost = cost;
-    out.shown = shown(frame, of_reference);
+    out.shown = shown(frame, reference);
     LayerBytes codebooks;
     for (auto& packet : frame.packets) {
         packet.frame = number;

@@ -8,6 +8,7 @@
 #include "codec/encoder/configuration.h"
 #include "codec/format/frame_payload.h"
 #include "codec/reference/node_reference.h"
+#include "codec/reference/reference.h"
 #include "codec/reference/textured_surface.h"
 #include "codec/reference/transforms.h"
 #include "core/lattice.h"
@@ -38,9 +39,10 @@ struct CodedFrame {
     bool referred = false;         // whether later frames may refer to it
     bool access = true;            // whether it is an I-frame or refers to a reference
     bool of_tracked_mesh = false;  // I: whether it was made of that, not of the capture
-    LatticeMesh decoded;           // the mesh that the decoder will have, without the seams of charts
+    LatticeMesh decoded;           // the mesh that the decoder will have, without detail and the seams of charts
     Presence presence;             // what of it is there; none: all is
     TexturedSurface textured;      // I, TP: of `decoded`, if the stream has charts
+    SurfaceDetail detail;          // I, TP: of `decoded`, with which it is shown
     CapturedCounts captured;       // of the mesh that it was made of
     LayerBytes shares;             // of a payload that is a run (FrameRules::is_run): its layers' bytes
     double renewed = 0;            // TP: the share of its vertices that are new
@@ -52,6 +54,9 @@ struct CodedFrame {
 // How rate control takes it: the size of a stand-in does not depend on quality, like that of a P-frame, and a frame
 // without a surface says nothing of what others take.
 FrameType rate_type(const CodedFrame& frame);
+
+// The detail with which a frame is shown. reference: that it refers to, or null.
+const SurfaceDetail& detail_of(const CodedFrame& frame, const Reference* reference);
 
 // A mesh as the decoder shows it.
 struct ShownMesh {
@@ -67,8 +72,8 @@ struct OutgoingFrame {
     ShownMesh shown;
     bool starts_decoding = false;  // whether the index names it
 };
-// of_reference: of the reference that the frame shows, or null. cost: of the frame, its header's included.
-OutgoingFrame outgoing(const Configuration& configuration, CodedFrame frame, const TexturedSurface* of_reference,
+// reference: that the frame shows, or null. cost: of the frame, its header's included.
+OutgoingFrame outgoing(const Configuration& configuration, CodedFrame frame, const Reference* reference,
                        std::uint32_t number, std::int64_t timestamp_us, const FrameCost& cost);
 
 // The reason of an I-frame of this number that is due. The first frame of a stream, and a stream of I-frames, need
@@ -89,6 +94,7 @@ std::int32_t step_for_reference(double edge, std::int32_t step);
 struct CodedIntra {
     FramePayload payload;
     LatticeMesh decoded;
+    SurfaceDetail detail;
     std::int32_t step = 1;  // of the reference that it becomes: Reference::step
 };
 // steps: of the quantisers. renewal: the mesh was smoothed when its reference was decoded. captured, pose: what the

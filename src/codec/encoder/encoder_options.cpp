@@ -15,6 +15,7 @@ constexpr std::array<const char*, 2> tracked_references = {"intra", "previous"};
 constexpr std::array<const char*, 2> denoising = {"off", "auto"};
 constexpr std::array<const char*, 2> hole_filling = {"off", "auto"};
 constexpr std::array<const char*, 2> specks = {"keep", "auto"};
+constexpr std::array<const char*, 3> reference_levels = {"auto", "off", "on"};
 constexpr std::array<const char*, 3> surface_presence = {"auto", "off", "on"};
 constexpr std::array<const char*, 3> captured_normals = {"auto", "keep", "none"};
 constexpr std::array<const char*, 4> frame_choices = {"fixed", "motion", "rd", "cheaper"};
@@ -300,6 +301,17 @@ constexpr Option list[] = {
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.denoise); },
      .set = [](EncoderOptions& o, double value) { o.tracked.denoise = static_cast<Denoising>(value); },
      .flag = "--denoise"},
+    {.name = "tracked.levels",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::word,
+     .meaning =
+         "the meshes that T-frames refer to as a base mesh, subdivided, with detail as displacements: about half the "
+         "bits, for a second or more of encoding each; auto, from effort 3 on where surface does not come and go and "
+         "there is no texture; on, at any effort; off, all vertices are coded alike",
+     .words = reference_levels,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.levels); },
+     .set = [](EncoderOptions& o, double value) { o.tracked.levels = static_cast<ReferenceLevels>(value); },
+     .flag = "--levels"},
     {.name = "tracked.presence",
      .group = OptionGroup::tracked,
      .kind = OptionKind::word,

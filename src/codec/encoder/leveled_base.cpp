@@ -25,14 +25,8 @@ LatticeMesh simplified(const LatticeMesh& captured, const LeveledBaseOptions& op
 std::vector<double> left_aside(const LatticeMesh& captured, const SurfaceIndex& sampled, const LatticeMesh& base,
                                const LeveledBaseOptions& options) {
     constexpr int rounds = 2, choices = 2;  // more bring nothing here
-    // Without the finest level, which hardly any displacement moves: what is left aside is left by those above.
-    SubdivisionDepth depth = options.depth;
-    if (depth.levels > 1) {
-        --depth.levels;
-        depth.longest_edge *= 2;
-    }
     SurfaceLevels levels;
-    levels.depth = depth;
+    const auto& depth = levels.depth = options.depth;
     levels.step = static_cast<std::uint32_t>(std::max(1.0, options.step.value * (1 << displacement_bits)));
     levels.rules.fill(options.rule);
     std::vector<double> out;
@@ -41,7 +35,7 @@ std::vector<double> left_aside(const LatticeMesh& captured, const SurfaceIndex& 
     SurfaceFitOptions fit_options;
     fit_options.choices = choices;
     fit_options.threads = options.threads;
-    SurfaceFit fit(sampled, base, *subdivision, levels, fit_options);
+    SurfaceFit fit(sampled, base, *subdivision, levels, depth.levels, fit_options);
     fit.improve(0, rounds);
     const SurfaceIndex shown(points_of(fit.surface()),
                              subdivision->empty() ? base.triangles : subdivision->back().triangles);

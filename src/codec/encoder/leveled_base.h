@@ -2,7 +2,7 @@
 // of the captured surface aside.
 #pragma once
 
-#include "codec/intra/subdivision.h"
+#include "codec/reference/subdivision.h"
 #include "core/lattice.h"
 #include "core/length.h"
 #include "core/thread.h"
@@ -16,7 +16,7 @@ struct LeveledBaseOptions {
     // RMS distance.
     int again = 1;
     double outlier = 3;
-    SubdivisionDepth depth;  // of the levels to come
+    SubdivisionDepth depth;  // of the levels to come that are coded
     SubdivisionRule rule;
     LatticeUnits step{29};  // of the finest level's displacements
     Threads threads = {};

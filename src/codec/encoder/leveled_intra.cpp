@@ -47,13 +47,28 @@ Result<LeveledIntra> encode_leveled_intra(const LatticeMesh& captured, const Lev
     levels.levels.depth = depth;
     levels.levels.step = in_header(options.step.value * (1 << displacement_bits));
     levels.levels.coarser = options.coarser;
+    levels.levels.rounded = static_cast<std::uint32_t>(std::clamp(std::lround(32 * options.rounded), 0L, 255L));
     levels.levels.rules.fill(options.rule);
     levels.lambda = options.lambda;
     levels.fit.least_moved = options.least_moved;
     levels.fit.threads = options.threads;
+    out.settings = levels.levels;
     auto encoded = encode_surface_levels(sampled, out.decoded_base, levels);
     if (!encoded) return tl::unexpected(encoded.error());
     out.levels = std::move(*encoded);
+    return out;
+}
+
+LeveledFrame put_leveled_intra(LeveledIntra coded, std::uint32_t referred, FramePayload& payload) {
+    payload.header = coded.base.header;
+    for (const auto layer : {Layer::fans, Layer::geometry}) payload.set(layer, coded.base.of(layer));
+    payload.set(Layer::levels,
+                write_levels_layer(referred, {coded.base.header.vertices, coded.base.header.triangles},
+                                   coded.levels.payload));
+    auto out = leveled_frame(coded.settings, std::move(coded.levels.surface), referred);
+    payload.header.vertices = static_cast<std::uint32_t>(out.mesh.positions.size());
+    payload.header.triangles = static_cast<std::uint32_t>(out.mesh.triangles.size());
+    payload.header.intra_coder = intra_coder_levels;
     return out;
 }
 

@@ -6,6 +6,7 @@
 
 #include "codec/encoder/surface_levels.h"
 #include "codec/format/frame_payload.h"
+#include "codec/intra/leveled_frame.h"
 #include "core/lattice.h"
 #include "core/length.h"
 #include "core/thread.h"
@@ -13,20 +14,22 @@
 namespace htvm::internal {
 
 struct LeveledIntraOptions {
-    LatticeUnits step{29};       // of the finest level's displacements, > 0
-    double base_error = 1.8;     // of the base's simplification, in steps
-    double longest_edge = 3.7;   // of the finest level's triangles, in steps
-    double base_step = 3.3;      // of the base's positions, in steps
-    std::uint32_t levels = 3;    // 0..most_levels
+    LatticeUnits step{22};       // of the finest coded level's displacements, > 0
+    double base_error = 2.4;     // of the base's simplification, in steps
+    double longest_edge = 9.9;   // of the finest coded level's triangles, in steps
+    double base_step = 4.4;      // of the base's positions, in steps
+    std::uint32_t levels = 2;    // that are coded, 0..most_levels
     std::uint32_t coarser = 12;  // see SurfaceLevels
+    double rounded = 0.19;       // SurfaceLevels::rounded, in steps; 0: no level that rounds off
     SubdivisionRule rule{2, 8};
-    int base_again = 1;        // see LeveledBaseOptions
-    double lambda = 0.06;      // see SurfaceLevelsOptions
-    double least_moved = 0.7;  // see SurfaceFitOptions
+    int base_again = 1;         // see LeveledBaseOptions
+    double lambda = 0.107;      // see SurfaceLevelsOptions
+    double least_moved = 0.93;  // see SurfaceFitOptions
     Threads threads = {};
 };
 
 struct LeveledIntra {
+    SurfaceLevels settings;
     FramePayload base;         // an I-frame of its own
     LatticeMesh decoded_base;  // as its decoder has it
     EncodedSurfaceLevels levels;
@@ -34,5 +37,9 @@ struct LeveledIntra {
 
 // captured: positions and triangles alone are coded.
 Result<LeveledIntra> encode_leveled_intra(const LatticeMesh& captured, const LeveledIntraOptions& options);
+
+// Puts it into a payload, but for attributes, and gives the mesh that the decoder will have. referred: the level that
+// frames refer to, or the last if there are fewer.
+LeveledFrame put_leveled_intra(LeveledIntra coded, std::uint32_t referred, FramePayload& payload);
 
 }  // namespace htvm::internal

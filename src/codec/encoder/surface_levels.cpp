@@ -1,5 +1,6 @@
 #include "codec/encoder/surface_levels.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "codec/intra/surface_levels_walk.h"
@@ -47,34 +48,56 @@ std::int32_t chosen_value(DisplacementModels& models, const DisplacementContext&
     return best;
 }
 
+// The fit sees the level that rounds off as if it split every edge that is long enough. False if these are too many.
+bool add_all_rounded(const LatticeMesh& base, const SurfaceLevels& levels, const MeshEdges& finest,
+                     std::vector<SubdivisionLevel>& subdivision) {
+    std::vector<Vector3d> flat;
+    for (const auto p : base.positions) flat.push_back(to_vector(p));
+    for (const auto& level : subdivision)
+        for (const auto& s : level.stencils) flat.push_back((flat[s.a] + flat[s.b]) * 0.5);
+    std::vector<std::uint8_t> split;
+    for (const auto& [a, b] : finest.ends) {
+        const Vector3d side = (flat[b] - flat[a]) * 2;
+        split.push_back(dot(side, side) > static_cast<double>(levels.depth.longest_edge) * levels.depth.longest_edge);
+    }
+    auto level = split_edges(flat, subdivision.empty() ? base.triangles : subdivision.back().triangles, finest, split,
+                             most_vertices);
+    if (level) subdivision.push_back(std::move(*level));
+    return level.has_value();
+}
+
 }  // namespace
 
 Result<EncodedSurfaceLevels> encode_surface_levels(const SurfaceIndex& captured, const LatticeMesh& base,
                                                    const SurfaceLevelsOptions& options) {
     EncodedSurfaceLevels out;
     const auto& levels = options.levels;
-    const auto whole = subdivide(base, levels.depth, most_vertices);
-    if (!whole) return fail(ErrorKind::limit, "surface levels: more vertices than can be coded; ask for longer edges");
-    const auto& subdivision = *whole;
-    SurfaceFit fit(captured, base, subdivision, levels, options.fit);
+    MeshEdges finest;
+    auto whole = subdivide(base, levels.depth, most_vertices, &finest);
+    if (!whole || (levels.rounded > 0 && !add_all_rounded(base, levels, finest, *whole)))
+        return fail(ErrorKind::limit, "surface levels: more vertices than can be coded; ask for longer edges");
+    const auto above = [&](std::size_t k) -> const std::vector<Triangle>& {
+        return k < 2 ? base.triangles : (*whole)[k - 2].triangles;
+    };
+    SurfaceFit fit(captured, base, *whole, levels, levels.depth.levels, options.fit);
     fit.improve(0, options.rounds);
     std::vector<std::int32_t> values;
     DisplacementModels models;
-    auto& positions = out.surface.positions;
+    auto& surface = out.surface;
+    surface.triangles = base.triangles;
     std::vector<std::vector<std::uint8_t>> runs;
     for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) {
-        const auto* level = k > 0 ? &subdivision[k - 1] : nullptr;
-        const auto& above = k > 1 ? subdivision[k - 2].triangles : base.triangles;
+        const auto* level = k > 0 ? &(*whole)[k - 1] : nullptr;
         const auto expected =
-            level ? ExpectedLevel(*level, positions, above, levels.rules[k - 1]) : ExpectedLevel(base);
-        const std::size_t first = positions.size();
+            level ? ExpectedLevel(*level, surface.positions, above(k), levels.rules[k - 1]) : ExpectedLevel(base);
+        const std::size_t first = surface.positions.size();
         const auto step = step_at(levels, k);
         const double in_steps = (1 << displacement_bits) / static_cast<double>(step);
         const double weight = static_cast<double>(step) * step / (static_cast<double>(levels.step) * levels.step);
         std::size_t moved = 0;
         RangeEncoder encoder;
         WritingCoder<RangeEncoder> coder{encoder};
-        code_displacements(coder, models, level, k, expected, step, positions, values,
+        code_displacements(coder, models, level, k, expected, step, surface, values,
                            [&](std::size_t i, const DisplacementContext& context) {
                                const std::size_t v = first + i;
                                const auto value =
@@ -86,10 +109,17 @@ Result<EncodedSurfaceLevels> encode_surface_levels(const SurfaceIndex& captured,
                            });
         if (k < levels.depth.levels) fit.improve(k + std::size_t{1}, 1);
         runs.push_back(encoder.finish());
-        out.parts.push_back({positions.size() - first, moved, runs.back().size()});
+        out.parts.push_back({surface.positions.size() - first, moved, runs.back().size()});
     }
     out.payload = write_surface_levels(levels, runs);
-    out.surface.triangles = subdivision.empty() ? base.triangles : subdivision.back().triangles;
+    whole->resize(levels.depth.levels);
+    surface.subdivision = std::move(*whole);
+    if (levels.rounded > 0) {
+        const auto before = surface.positions.size();
+        if (!round_off(levels, finest, most_vertices, surface))
+            return fail(ErrorKind::limit, "surface levels: more vertices than can be coded; ask for a larger bend");
+        out.parts.push_back({surface.positions.size() - before, 0, 0});
+    }
     return out;
 }
 

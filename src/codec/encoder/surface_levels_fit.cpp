@@ -34,8 +34,13 @@ SurfaceIndex evenly_sampled(const LatticeMesh& captured, Threads threads) {
 
 SurfaceFit::SurfaceFit(const SurfaceIndex& captured, const LatticeMesh& base,
                        std::span<const SubdivisionLevel> subdivision, const SurfaceLevels& levels,
-                       const SurfaceFitOptions& options)
-    : captured_(captured), base_(base), subdivision_(subdivision), levels_(levels), options_(options) {
+                       std::size_t displaced, const SurfaceFitOptions& options)
+    : captured_(captured),
+      base_(base),
+      subdivision_(subdivision),
+      levels_(levels),
+      displaced_(displaced),
+      options_(options) {
     // Vertices and the middles of triangles, each for a part of the area beside it.
     const auto vertices = captured.positions.size();
     points_ = captured.positions;
@@ -305,7 +310,7 @@ void SurfaceFit::solve(std::span<const std::uint8_t> is_free, std::vector<double
 void SurfaceFit::choose_and_solve(std::size_t first) {
     std::vector<std::uint8_t> is_free(displacements_.size(), 0);
     auto wanted = gradient(moved_by(change_), true);
-    for (std::size_t v = first; v < is_free.size(); ++v) {
+    for (std::size_t v = first; v < end_of(displaced_); ++v) {
         if (!(mass_[v] > 0)) continue;
         const double now = displacements_[v] + change_[v];
         is_free[v] = now != 0 || v < base_.positions.size() || std::abs(now + wanted[v] / mass_[v]) >= least(v);

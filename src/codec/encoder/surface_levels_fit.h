@@ -34,9 +34,10 @@ SurfaceIndex evenly_sampled(const LatticeMesh& captured, Threads threads);
 
 class SurfaceFit {
 public:
-    // All that is passed must outlive the fit. levels.rules are set.
+    // All that is passed must outlive the fit. levels.rules are set. displaced: the last level whose vertices may be
+    // displaced; those below follow by their rules alone.
     SurfaceFit(const SurfaceIndex& captured, const LatticeMesh& base, std::span<const SubdivisionLevel> subdivision,
-               const SurfaceLevels& levels, const SurfaceFitOptions& options);
+               const SurfaceLevels& levels, std::size_t displaced, const SurfaceFitOptions& options);
 
     // Sets displacements of the levels from `first` on to what fits best beside those above.
     void improve(std::size_t first, int rounds);
@@ -78,6 +79,7 @@ private:
     const LatticeMesh& base_;
     std::span<const SubdivisionLevel> subdivision_;
     const SurfaceLevels& levels_;
+    const std::size_t displaced_;
     const SurfaceFitOptions& options_;
     std::vector<Point3f> points_, facing_;  // samples of the captured surface
     std::vector<float> areas_;              // that each stands for

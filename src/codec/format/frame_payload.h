@@ -16,6 +16,7 @@ namespace htvm::internal {
 
 inline constexpr std::uint8_t intra_coder_tfan = 0;
 inline constexpr std::uint8_t intra_coder_draco = 1;
+inline constexpr std::uint8_t intra_coder_levels = 2;  // intra/leveled_frame.h
 
 // The size of the mesh that a frame was captured with.
 struct CapturedCounts {

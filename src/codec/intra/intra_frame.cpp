@@ -43,6 +43,34 @@ LatticeMesh without_duplicates(const LatticeMesh& grid, std::int32_t colour_step
     return out;
 }
 
+// Normals and texture coordinates.
+void encode_values(const LatticeMesh& mesh, const Neighbours& neighbours, FramePayload& payload) {
+    if (!mesh.normals.empty()) payload.set(Layer::normals, encode_attribute_values(mesh.normals, neighbours));
+    if (!mesh.texcoords.empty()) payload.set(Layer::texcoords, encode_attribute_values(mesh.texcoords, neighbours));
+}
+Result<void> decode_values(const FramePayloadView& payload, const Neighbours& neighbours, LatticeMesh& mesh) {
+    if (payload.has(Layer::normals)) {
+        auto normals = decode_attribute_values<QuantisedNormal>(payload.of(Layer::normals), neighbours);
+        if (!normals) return tl::unexpected(normals.error());
+        mesh.normals = std::move(*normals);
+    }
+    if (payload.has(Layer::texcoords)) {
+        auto texcoords = decode_attribute_values<QuantisedTexcoord>(payload.of(Layer::texcoords), neighbours);
+        if (!texcoords) return tl::unexpected(texcoords.error());
+        mesh.texcoords = std::move(*texcoords);
+    }
+    return {};
+}
+
+// The vertices of a mesh in coding order, each with its neighbours.
+Result<Neighbours> ordered_neighbours(const LatticeMesh& mesh, Threads threads) {
+    const auto corners = find_corners(mesh.triangles, mesh.positions.size(), threads);
+    if (!corners) return tl::unexpected(corners.error());
+    auto out = empty_rows(*corners);
+    order_vertices(*corners, {}, out);
+    return out;
+}
+
 Result<LatticeMesh> encode_by_tfan(const LatticeMesh& grid, const IntraFrameOptions& options, FramePayload& payload) {
     auto connectivity = encode_tfan(static_cast<std::uint32_t>(grid.positions.size()), grid.triangles);
     LatticeMesh mesh = kept_vertices(grid, connectivity.order);
@@ -71,8 +99,7 @@ Result<LatticeMesh> encode_by_tfan(const LatticeMesh& grid, const IntraFrameOpti
         payload.set(Layer::colour, std::move(colours.bytes));
         mesh.colours = std::move(colours.decoded);
     }
-    if (!mesh.normals.empty()) payload.set(Layer::normals, encode_attribute_values(mesh.normals, neighbours));
-    if (!mesh.texcoords.empty()) payload.set(Layer::texcoords, encode_attribute_values(mesh.texcoords, neighbours));
+    encode_values(mesh, neighbours, payload);
     return mesh;
 }
 
@@ -124,16 +151,7 @@ Result<LatticeMesh> decode_by_tfan(const FramePayloadView& payload, Threads thre
     if (!positions) return tl::unexpected(positions.error());
     if (!colours) return tl::unexpected(colours.error());
     mesh.colours = std::move(*colours);
-    if (payload.has(Layer::normals)) {
-        auto normals = decode_attribute_values<QuantisedNormal>(payload.of(Layer::normals), neighbours);
-        if (!normals) return tl::unexpected(normals.error());
-        mesh.normals = std::move(*normals);
-    }
-    if (payload.has(Layer::texcoords)) {
-        auto texcoords = decode_attribute_values<QuantisedTexcoord>(payload.of(Layer::texcoords), neighbours);
-        if (!texcoords) return tl::unexpected(texcoords.error());
-        mesh.texcoords = std::move(*texcoords);
-    }
+    if (auto ok = decode_values(payload, neighbours, mesh); !ok) return tl::unexpected(ok.error());
     return mesh;
 }
 
@@ -187,6 +205,33 @@ Result<LatticeMesh> encode_intra_frame(const LatticeMesh& mesh, const IntraFrame
     header.colour_step = static_cast<std::uint32_t>(options.colour_step);
     header.intra_coder = options.external ? options.external->number : intra_coder_tfan;
     return decoded;
+}
+
+Result<void> encode_intra_attributes(LatticeMesh& mesh, std::int32_t colour_step, FramePayload& payload,
+                                     Threads threads) {
+    payload.header.colour_step = static_cast<std::uint32_t>(colour_step);
+    const auto neighbours = ordered_neighbours(mesh, threads_for(mesh.positions.size(), threads));
+    if (!neighbours) return tl::unexpected(neighbours.error());
+    if (!mesh.colours.empty()) {
+        auto colours = encode_intra_colours(mesh.colours, mesh.positions, *neighbours, colour_step, {});
+        payload.set(Layer::colour, std::move(colours.bytes));
+        mesh.colours = std::move(colours.decoded);
+    }
+    encode_values(mesh, *neighbours, payload);
+    return {};
+}
+
+Result<void> decode_intra_attributes(const FramePayloadView& payload, LatticeMesh& mesh, Threads threads) {
+    if (!payload.has(Layer::colour) && !payload.has(Layer::normals) && !payload.has(Layer::texcoords)) return {};
+    const auto neighbours = ordered_neighbours(mesh, threads_for(mesh.positions.size(), threads));
+    if (!neighbours) return fail(ErrorKind::corrupt_stream, "I-frame: " + neighbours.error().message);
+    if (payload.has(Layer::colour)) {
+        auto colours = decode_intra_colours(payload.of(Layer::colour), mesh.positions, *neighbours,
+                                            static_cast<std::int32_t>(payload.header.colour_step), {});
+        if (!colours) return tl::unexpected(colours.error());
+        mesh.colours = std::move(*colours);
+    }
+    return decode_values(payload, *neighbours, mesh);
 }
 
 Result<LatticeMesh> decode_intra_frame(const FramePayloadView& payload, const ExternalIntraCoder* external,

@@ -28,6 +28,13 @@ struct IntraFrameOptions {
 Result<LatticeMesh> encode_intra_frame(const LatticeMesh& mesh, const IntraFrameOptions& options,
                                        FramePayload& payload);
 
+// What vertices have beside their positions: sets the layers and the header's colour_step, and the mesh's colours to
+// what the decoder will have. The mesh's positions and triangles are as the decoder has them.
+Result<void> encode_intra_attributes(LatticeMesh& mesh, std::int32_t colour_step, FramePayload& payload,
+                                     Threads threads = {});
+// Sets what the layers hold.
+Result<void> decode_intra_attributes(const FramePayloadView& payload, LatticeMesh& mesh, Threads threads = {});
+
 // external: the coder with the number that the payload names; null gives `unsupported`.
 Result<LatticeMesh> decode_intra_frame(const FramePayloadView& payload, const ExternalIntraCoder* external,
                                        Threads threads = {});

@@ -35,18 +35,6 @@ std::uint32_t step_at(const SurfaceLevels& levels, std::uint32_t level) {
     return std::max(step, 1u);
 }
 
-LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, std::int32_t value,
-                              std::uint32_t step) {
-    const double distance = static_cast<double>(value) * static_cast<double>(step) / (1 << displacement_bits);
-    // To the nearest, halves up: cutting off rounds down once what is below zero is corrected.
-    const auto along = [&](std::size_t i) {
-        const double moved = expected[i] + normal[i] * distance + 0.5;
-        const auto whole = static_cast<std::int64_t>(moved);
-        return within_lattice(whole - (moved < static_cast<double>(whole)));
-    };
-    return {along(0), along(1), along(2)};
-}
-
 DisplacementContext displacement_context(const SubdivisionLevel& level, std::size_t i, std::uint32_t number,
                                          std::span<const std::int32_t> values, double bent, std::uint32_t step) {
     DisplacementContext out;
@@ -83,7 +71,8 @@ std::vector<std::uint8_t> write_surface_levels(const SurfaceLevels& levels,
     out.u8(static_cast<std::uint8_t>(levels.depth.levels | (levels.coarser - 1) << 4));
     out.varint(levels.depth.longest_edge - 1);
     out.varint(levels.step - 1);
-    for (std::uint32_t k = 0; k < levels.depth.levels; ++k)
+    out.u8(static_cast<std::uint8_t>(levels.rounded));
+    for (std::uint32_t k = 0; k < levels.depth.levels + (levels.rounded > 0 ? 1 : 0); ++k)
         out.u8(static_cast<std::uint8_t>(levels.rules[k].butterfly | levels.rules[k].tangents << 4));
     for (const auto& run : runs) out.varint(run.size());
     for (const auto& run : runs) out.bytes(run);
@@ -102,7 +91,8 @@ Result<SurfaceLevelsHeader> read_levels_header(std::span<const std::uint8_t> pay
         return fail(ErrorKind::corrupt_stream, "surface levels: a number is out of range");
     levels.depth.longest_edge = static_cast<std::uint32_t>(longest) + 1;
     levels.step = static_cast<std::uint32_t>(step) + 1;
-    for (std::uint32_t k = 0; k < levels.depth.levels; ++k) {
+    levels.rounded = in.u8();
+    for (std::uint32_t k = 0; k < levels.depth.levels + (levels.rounded > 0 ? 1 : 0); ++k) {
         const std::uint32_t rule = in.u8();
         levels.rules[k] = {rule & 15, rule >> 4};
     }
@@ -118,18 +108,42 @@ Result<SurfaceLevelsHeader> read_levels_header(std::span<const std::uint8_t> pay
     return out;
 }
 
+bool round_off(const SurfaceLevels& levels, const MeshEdges& edges, std::size_t most_vertices, LeveledSurface& surface) {
+    const auto& triangles = surface.finest();
+    const double least = displacement_of(static_cast<std::int32_t>(levels.rounded), levels.step) / 32;
+    std::vector<Vector3d> places;
+    places.reserve(surface.positions.size());
+    for (const auto& p : surface.positions) places.push_back(to_vector(p));
+    auto level = split_edges(places, triangles, edges,
+                             bent_edges(surface.positions, vertex_normals(surface.positions, triangles), edges, least),
+                             most_vertices);
+    if (!level) return false;
+    const ExpectedLevel expected(*level, surface.positions, triangles, levels.rules[levels.depth.levels]);
+    surface.positions.reserve(surface.positions.size() + expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i)
+        surface.positions.push_back(displaced_vertex(expected.vertex(i).at, {}, 0));
+    surface.displacements.resize(surface.positions.size(), 0);
+    surface.subdivision.push_back(std::move(*level));
+    return true;
+}
+
 Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> payload, const LatticeMesh& base,
                                              std::size_t most_vertices, std::uint32_t down_to) {
     const auto header = read_levels_header(payload);
     if (!header) return tl::unexpected(header.error());
     const auto& levels = header->levels;
     const std::uint32_t last = std::min(down_to, levels.depth.levels);
+    const bool rounds = levels.rounded > 0 && down_to > levels.depth.levels;
     if (payload.size() < header->ends[last]) return fail(ErrorKind::corrupt_stream, "surface levels: a run is cut off");
+    const auto too_many = [] { return fail(ErrorKind::limit, "surface levels: more vertices than may be decoded"); };
     // The first levels are those of a surface that has no more.
-    auto subdivision =
-        subdivide(base, {last, levels.depth.longest_edge << (levels.depth.levels - last)}, most_vertices);
-    if (!subdivision) return fail(ErrorKind::limit, "surface levels: more vertices than may be decoded");
+    MeshEdges finest;
+    auto subdivision = subdivide(base, {last, levels.depth.longest_edge << (levels.depth.levels - last)}, most_vertices,
+                                 rounds ? &finest : nullptr);
+    if (!subdivision) return too_many();
     LeveledSurface out;
+    out.triangles = base.triangles;
+    out.subdivision = std::move(*subdivision);
     std::vector<std::int32_t> values;
     DisplacementModels models;
     std::size_t begin = header->first_run;
@@ -137,14 +151,14 @@ Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> paylo
         RangeDecoder decoder(payload.subspan(begin, header->ends[k] - begin));
         begin = header->ends[k];
         ReadingCoder<RangeDecoder> coder{decoder};
-        auto* level = k > 0 ? &(*subdivision)[k - 1] : nullptr;
-        const auto expected =
-            level ? ExpectedLevel(*level, out.positions, out.triangles, levels.rules[k - 1]) : ExpectedLevel(base);
-        code_displacements(coder, models, level, k, expected, step_at(levels, k), out.positions, values,
+        const auto* level = k > 0 ? &out.subdivision[k - 1] : nullptr;
+        const auto expected = level ? ExpectedLevel(*level, out.positions, out.triangles_above(k), levels.rules[k - 1])
+                                    : ExpectedLevel(base);
+        code_displacements(coder, models, level, k, expected, step_at(levels, k), out, values,
                            [](std::size_t, const DisplacementContext&) { return 0; });
-        out.triangles = level ? std::move(level->triangles) : base.triangles;
         if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "surface levels: a run ends too early");
     }
+    if (rounds && !round_off(levels, finest, most_vertices, out)) return too_many();
     return out;
 }
 

@@ -143,18 +143,24 @@ private:
     std::vector<Vector3d> normals_;
 };
 
+// Adds the level that rounds off. edges: of the finest level so far. False if there would be more vertices than these;
+// then the surface is as it was.
+bool round_off(const SurfaceLevels& levels, const MeshEdges& edges, std::size_t most_vertices, LeveledSurface& surface);
+
 // The context of vertex i of a level. values: quantised displacements of the vertices before it; those of the base
 // count as zero, since what a coarse base leaves says nothing of what is below.
 DisplacementContext displacement_context(const SubdivisionLevel& level, std::size_t i, std::uint32_t number,
                                          std::span<const std::int32_t> values, double bent, std::uint32_t step);
 
-// Codes the displacements of a level, whose number is 0 for the base, and moves its vertices. The vectors end where it
-// begins. level: null for the base. choose(i, context) gives the value that is wanted; decoding, anything.
+// Codes the displacements of a level, whose number is 0 for the base, and moves its vertices, which are added to those
+// of the surface. level: null for the base. values: quantised, of the vertices so far. choose(i, context) gives the
+// value that is wanted; decoding, anything.
 template <class Coder, class Choose>
 void code_displacements(Coder& coder, DisplacementModels& models, const SubdivisionLevel* level, std::uint32_t number,
-                        const ExpectedLevel& expected, std::uint32_t step, std::vector<LatticePoint>& positions,
+                        const ExpectedLevel& expected, std::uint32_t step, LeveledSurface& surface,
                         std::vector<std::int32_t>& values, const Choose& choose) {
-    positions.reserve(positions.size() + expected.size());
+    surface.positions.reserve(surface.positions.size() + expected.size());
+    surface.displacements.reserve(surface.displacements.size() + expected.size());
     values.reserve(values.size() + expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i) {
         const auto vertex = expected.vertex(i);
@@ -163,7 +169,10 @@ void code_displacements(Coder& coder, DisplacementModels& models, const Subdivis
         const auto value = code_displacement(coder, models, context, choose(i, context));
         values.push_back(level ? value : 0);
         // Most are not displaced, and then the normal need not be known.
-        positions.push_back(displaced_vertex(vertex.at, value != 0 ? expected.normal(i) : Vector3d{}, value, step));
+        const double displacement = displacement_of(value, step);
+        surface.displacements.push_back(displacement);
+        surface.positions.push_back(
+            displaced_vertex(vertex.at, value != 0 ? expected.normal(i) : Vector3d{}, displacement));
     }
 }
 

@@ -54,6 +54,7 @@ Result<Reference> make_reference(const SequenceHeader& header, ReferenceFacts fa
     out.kept = std::move(facts.kept);
     out.textured = std::move(facts.textured);
     out.presence = std::move(facts.presence);
+    out.detail = std::move(facts.detail);
     out.skinned.mesh = std::move(mesh);
     out.skinned.joints = std::move(pose.joints);
     out.skinned.orientations = std::move(pose.orientations);

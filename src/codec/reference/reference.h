@@ -9,6 +9,7 @@
 #include "codec/format/sequence.h"
 #include "codec/reference/node_reference.h"
 #include "codec/reference/skinning.h"
+#include "codec/reference/surface_detail.h"
 #include "codec/reference/textured_surface.h"
 #include "codec/reference/transforms.h"
 #include "core/thread.h"
@@ -26,6 +27,7 @@ struct Reference {
     KeptNodes kept;                         // of a patched mesh: what it takes over of the nodes before
     std::optional<NodesAhead> ahead;        // of what depends on the nodes, if only this was derived so far
     Presence presence;                      // of the mesh's vertices, in streams that tell it
+    SurfaceDetail detail;                   // of the mesh, with which it is shown
     const LatticeMesh& mesh() const { return skinned.mesh; }
 };
 
@@ -43,6 +45,7 @@ struct ReferenceFacts {
     KeptNodes kept = {};  // of a TP-frame
     TexturedSurface textured = {};
     Presence presence = {};
+    SurfaceDetail detail = {};
 };
 
 // Smooths an I-frame's mesh within its quantiser cells, as it is shown in streams with nodes from

@@ -154,7 +154,7 @@ Result<BonesIntra> code_measured_intra(const BonesWork& work, const FrameSteps& 
     const auto plain = code_unreferred_intra(work, steps, FrameReason::none);
     if (!plain) return plain;
     StageClock clock(work.stages);
-    out->plain = errors_of(work, plain->frame.decoded);
+    out->plain = errors_of(work, plain->frame);
     clock.done("errors");
     return out;
 }
@@ -178,10 +178,10 @@ std::optional<BonesMoved> choose_animation(const BonesWork& work, BonesProgress&
     }
     if (animated == 0) return std::nullopt;
     auto moved = code_predicted(work);
-    if (within(errors_of(work, moved.frame.decoded), allowed)) return moved;
+    if (within(errors_of(work, moved.frame), allowed)) return moved;
     if (animated == coded.size()) return std::nullopt;
     auto in_part = code_coded_bones(work, steps, coded, std::exchange(progress.quantised, std::nullopt));
-    if (!within(errors_of(work, in_part.frame.decoded), allowed)) return std::nullopt;
+    if (!within(errors_of(work, in_part.frame), allowed)) return std::nullopt;
     return in_part;
 }
 
@@ -198,7 +198,7 @@ Result<Frame> choose_by_cost(const BonesWork& work, BonesProgress& progress, con
     const auto allowed = allowed_errors(work.reference(), steps);
     if (auto animated = choose_animation(work, progress, steps, allowed)) return Frame(std::move(*animated));
     auto enhanced = code_whole(work, progress, steps);
-    const bool good = within(errors_of(work, enhanced.frame.decoded), allowed);
+    const bool good = within(errors_of(work, enhanced.frame), allowed);
     const bool due = intra_is_paid_for(work, enhanced.frame);
     if (good && !due && !is_expensive(work, enhanced.frame)) return Frame(std::move(enhanced));
     auto intra = code_measured_intra(work, steps, good ? FrameReason::rate : FrameReason::surface);
@@ -238,8 +238,8 @@ Result<Frame> code_stand_in(const BonesWork& work, BonesProgress&, const FrameSt
     return Frame(code_predicted(work));
 }
 
-SurfaceErrors errors_of(const BonesWork& work, const LatticeMesh& decoded) {
-    return errors_between(work.mesh(), *work.surface, decoded, work.configuration.threads);
+SurfaceErrors errors_of(const BonesWork& work, const CodedFrame& frame) {
+    return errors_between(work.mesh(), *work.surface, frame.decoded, work.configuration.threads);
 }
 
 std::optional<FrameSteps> enhanced_steps(const Configuration& configuration) {

@@ -16,8 +16,8 @@ Result<BonesWork::Frame> choose(const BonesWork& work, BonesProgress& progress, 
 // The cheapest frame there is, where the reference can be moved: a P-frame.
 Result<BonesWork::Frame> code_stand_in(const BonesWork& work, BonesProgress& progress, const FrameSteps& steps);
 
-// The distance between a decoded mesh and the captured one.
-SurfaceErrors errors_of(const BonesWork& work, const LatticeMesh& decoded);
+// The distance between what is shown of a frame and the captured mesh.
+SurfaceErrors errors_of(const BonesWork& work, const CodedFrame& frame);
 
 // The steps at which the next EP-frame's whole surface is quantised first, if that follows from the options alone.
 std::optional<FrameSteps> enhanced_steps(const Configuration& configuration);

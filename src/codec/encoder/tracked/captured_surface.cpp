@@ -99,13 +99,19 @@ SurfaceSamples samples_of(const MovedReference& moved, const SampleRule& rule) {
     out.normals.reserve(count);
     out.points = points_of(moved.positions);
     out.normals = points_of(moved.normals);
-    for (const auto& t : moved.triangles)
+    for (std::size_t triangle = 0; triangle < moved.triangles.size(); ++triangle)
         for (const auto& sample : rule.inner) {
+            const auto& t = moved.triangles[triangle];
             Vector3d point{}, normal{};
             for (std::size_t i = 0; i < 3; ++i) {
                 point = point + to_vector(moved.positions[t[i]]) * static_cast<double>(sample.shares[i]);
                 normal = normal + moved.normals[t[i]] * static_cast<double>(sample.shares[i]);
             }
+            // As a quadratic patch through the corners and what lies off the middles of the sides.
+            if (!moved.bulges.empty())
+                for (std::size_t i = 0; i < 3; ++i)
+                    point = point + moved.bulges[triangle][i] *
+                                        static_cast<double>(4 * sample.shares[i] * sample.shares[(i + 1) % 3]);
             out.points.push_back(to_floats(point));
             out.normals.push_back(to_floats(normalised(normal)));
         }
@@ -333,6 +339,28 @@ SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions&
     return out;
 }
 
+std::vector<Bulge> bulges_of(const SurfaceDetail& detail, std::span<const LatticePoint> moved,
+                             std::span<const Triangle> triangles) {
+    if (detail.empty()) return {};
+    std::vector<LatticePoint> shown(moved.begin(), moved.end());
+    add_detail(detail, 1, triangles, shown);
+    const auto& level = detail.levels.front();
+    std::vector<Bulge> out(triangles.size(), Bulge{});
+    for (std::size_t part = 0; part < level.triangles.size(); ++part)
+        for (const auto v : level.triangles[part]) {
+            if (v < level.first) continue;
+            const auto& s = level.stencils[v - level.first];
+            const auto& corners = triangles[level.parent[part]];
+            for (std::size_t i = 0; i < 3; ++i) {
+                const auto from = corners[i], to = corners[(i + 1) % 3];
+                if (std::min(from, to) == s.a && std::max(from, to) == s.b)
+                    out[level.parent[part]][i] =
+                        to_vector(shown[v]) - (to_vector(shown[s.a]) + to_vector(shown[s.b])) * 0.5;
+            }
+        }
+    return out;
+}
+
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
                                     const SurfaceIndex& surface, const TargetSearch& how,
                                     std::vector<std::uint32_t> near) {
@@ -355,7 +383,7 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
     out.near = std::move(near);
     out.displacement.resize(vertices);
     // A field cannot code more than this: 16 mm on the finest lattice. The surface then lags behind by the rest.
-    constexpr float most = field_limit, most_levels = 255;
+    constexpr float most = field_limit, most_colour = 255;
     for (std::size_t v = 0; v < vertices; ++v)
         out.displacement[v] = static_cast<std::int32_t>(std::lround(std::clamp(fitted[v][0], -most, most)));
     if (moved.colours.empty()) return out;
@@ -363,7 +391,7 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
     for (std::size_t v = 0; v < vertices; ++v)
         for (std::size_t c = 0; c < 3; ++c)
             out.colours[3 * v + c] =
-                static_cast<std::int32_t>(std::lround(std::clamp(fitted[v][1 + c], -most_levels, most_levels)));
+                static_cast<std::int32_t>(std::lround(std::clamp(fitted[v][1 + c], -most_colour, most_colour)));
     return out;
 }
 

@@ -10,6 +10,7 @@
 
 #include "codec/encoder/tracking_numbers.h"
 #include "codec/intra/duplicates.h"
+#include "codec/reference/surface_detail.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/lattice.h"
 #include "core/length.h"
@@ -22,12 +23,19 @@ namespace htvm::internal {
 // The captured mesh, prepared for registration to it.
 SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions& options);
 
+// How far a triangle's surface passes off the middle of each of its sides, from one corner to the next.
+using Bulge = std::array<Vector3d, 3>;
+// Of each triangle of a moved reference that is shown with detail; nothing where there is none.
+std::vector<Bulge> bulges_of(const SurfaceDetail& detail, std::span<const LatticePoint> moved,
+                             std::span<const Triangle> triangles);
+
 // A reference mesh moved by its nodes.
 struct MovedReference {
     std::span<const LatticePoint> positions;
     std::span<const Vector3d> normals;  // one per vertex
     std::span<const Triangle> triangles;
     std::span<const Colour> colours;  // one per vertex, or none
+    std::span<const Bulge> bulges{};  // one per triangle, or none: they are shown flat
 };
 
 struct TrackedTargets {

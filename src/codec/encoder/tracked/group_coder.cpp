@@ -23,6 +23,7 @@ public:
                std::span<const HeldFrame> held, std::vector<StageTime>& stages)
         : configuration_(configuration),
           reference_(*reference.decoded.by_nodes),
+          detail_(&reference.decoded.detail),
           before_(before),
           held_(held),
           stages_(stages),
@@ -33,6 +34,7 @@ public:
         auto options = tracked_frame_options(configuration_, held.steps);
         options.noise = &held.noise;
         options.presence = held.presence;
+        options.detail = detail_;
         std::optional<TrackedState> between;
         if (frame.later > 0) {
             between = state_between(
@@ -59,6 +61,7 @@ private:
 
     const Configuration& configuration_;
     const NodeReference& reference_;
+    const SurfaceDetail* detail_;
     const TrackedState* before_;
     std::span<const HeldFrame> held_;
     std::vector<StageTime>& stages_;
@@ -100,7 +103,7 @@ Result<CodedGroup> code_group(const Configuration& configuration, const TrackedR
         FrameCost cost;
         cost.type = frame.type;
         cost.bits = 8.0 * static_cast<double>(frame.bytes());
-        out.frames.push_back(outgoing(configuration, std::move(frame), &reference.decoded.textured, held[i].number,
+        out.frames.push_back(outgoing(configuration, std::move(frame), &reference.decoded, held[i].number,
                                       held[i].timestamp_us, cost));
         out.frames.back().info.group = static_cast<std::uint8_t>(length);
         out.frames.back().info.place = static_cast<std::uint8_t>(i + 1);

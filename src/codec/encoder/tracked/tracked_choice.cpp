@@ -384,8 +384,10 @@ Result<Frame> code_stand_in(const TrackedWork& work, Tracking& tracking, const F
     return Frame(chosen_motion(work, *tracking.registered, std::move(*coded), work.sequence.history.best_fit));
 }
 
-SurfaceErrors errors_of(const TrackedWork& work, const LatticeMesh& decoded) {
-    return errors_between(work.captured.mesh, work.surface, decoded, work.configuration.threads);
+SurfaceErrors errors_of(const TrackedWork& work, const CodedFrame& frame) {
+    const auto& detail = detail_of(frame, work.reference ? &work.reference->decoded : nullptr);
+    return errors_between(work.captured.mesh, work.surface,
+                          detail.empty() ? frame.decoded : detailed(detail, frame.decoded), work.configuration.threads);
 }
 
 }  // namespace htvm::internal

@@ -15,7 +15,7 @@ Result<TrackedWork::Frame> choose(const TrackedWork& work, Tracking& tracking, c
 // The cheapest frame there is, where the reference can be moved: the motion of its nodes alone.
 Result<TrackedWork::Frame> code_stand_in(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps);
 
-// The distance between a decoded mesh and the captured one.
-SurfaceErrors errors_of(const TrackedWork& work, const LatticeMesh& decoded);
+// The distance between what is shown of a frame and the captured mesh.
+SurfaceErrors errors_of(const TrackedWork& work, const CodedFrame& frame);
 
 }  // namespace htvm::internal

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "codec/encoder/charts/chart_packing.h"
+#include "codec/encoder/leveled_intra.h"
 #include "codec/intra/intra_frame.h"
 #include "codec/tracked/frame_group.h"
 #include "codec/tracked/presence.h"
@@ -85,6 +86,41 @@ Presence presence_by_place(const IntraSource& source, const LatticeMesh& coded, 
     return out;
 }
 
+// The frame that a coded mesh becomes, with its charts. steps: asked for.
+Result<TrackedIntra> sent_as(const TrackedWork& work, CodedIntra coded, Presence presence, bool renewal,
+                             const FrameSteps& steps, IntraUse use, FrameReason reason) {
+    const auto& configuration = work.configuration;
+    const bool referred_to = use == IntraUse::reference;
+    StageClock clock(work.stages);
+    auto charts = add_charts(coded.decoded, configuration.options.texture, coded.payload);
+    if (!charts) return tl::unexpected(charts.error());
+    TrackedIntra out;
+    out.step = coded.step;
+    out.pose = work.captured.pose;
+    auto& frame = out.frame;
+    frame.type = FrameType::intra;
+    frame.reference = work.sequence.next_frame;
+    frame.textured = std::move(charts->textured);
+    frame.decoded = std::move(coded.decoded);
+    frame.detail = std::move(coded.detail);
+    frame.presence = std::move(presence);
+    frame.captured = counts_of(work.captured.mesh);
+    frame.of_tracked_mesh = renewal;
+    // Under rate control also what stands in for a frame that does not fit may refer to it.
+    frame.referred = carries_surface(work.captured.mesh) && !frame.decoded.triangles.empty() &&
+                     (!configuration.intra_only() || configuration.options.rate.bits_per_second > 0);
+    frame.packets.push_back(frame_packet(PacketKind::intra, std::move(coded.payload), reason));
+    auto& origin = out.origin;
+    origin.edge = mean_edge(work.captured.mesh.positions, work.captured.mesh.triangles);
+    origin.steps = steps;
+    origin.chart_scale = charts->scale;
+    origin.vertices = frame.decoded.positions.size();
+    if (referred_to) origin.colours = colours_at(work, frame.decoded);
+    clock.done("intra coding");
+    if (referred_to && frame.referred) origin.fit = fit_of(work, frame.decoded, origin.edge, {});
+    return out;
+}
+
 // steps: asked for.
 Result<TrackedIntra> code_intra_of(const TrackedWork& work, const IntraSource& source, const FrameSteps& steps,
                                    FrameSteps quantised, IntraUse use, FrameReason reason) {
@@ -102,36 +138,71 @@ Result<TrackedIntra> code_intra_of(const TrackedWork& work, const IntraSource& s
         presence = presence_by_place(source, coded->decoded, quantised.geometry);
         coded->payload.set(Layer::presence, write_presence_layer(coded->decoded.triangles, presence));
     }
-    auto charts = add_charts(coded->decoded, configuration.options.texture, coded->payload);
-    if (!charts) return tl::unexpected(charts.error());
-    TrackedIntra out;
-    out.step = coded->step;
-    out.pose = work.captured.pose;
-    auto& frame = out.frame;
-    frame.type = FrameType::intra;
-    frame.reference = work.sequence.next_frame;
-    frame.textured = std::move(charts->textured);
-    frame.decoded = std::move(coded->decoded);
-    frame.presence = std::move(presence);
-    frame.captured = captured;
-    frame.of_tracked_mesh = source.renewal;
-    // Under rate control also what stands in for a frame that does not fit may refer to it.
-    frame.referred = carries_surface(work.captured.mesh) && !frame.decoded.triangles.empty() &&
-                     (!configuration.intra_only() || configuration.options.rate.bits_per_second > 0);
-    frame.packets.push_back(frame_packet(PacketKind::intra, std::move(coded->payload), reason));
-    auto& origin = out.origin;
-    origin.edge = mean_edge(work.captured.mesh.positions, work.captured.mesh.triangles);
-    origin.steps = steps;
-    origin.chart_scale = charts->scale;
-    origin.vertices = frame.decoded.positions.size();
-    if (referred_to) origin.colours = colours_at(work, frame.decoded);
     clock.done("intra coding");
-    if (referred_to && frame.referred) origin.fit = fit_of(work, frame.decoded, origin.edge, {});
-    return out;
+    return sent_as(work, std::move(*coded), std::move(presence), source.renewal, steps, use, reason);
+}
+
+// An I-frame's base and its levels. source: with the colours that are to be coded. surface: its index. Nothing if the
+// detail would have too many vertices.
+Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const LatticeMesh& source,
+                                                const SurfaceIndex& surface, bool renewal, const FrameSteps& steps,
+                                                FrameReason reason) {
+    const auto& configuration = work.configuration;
+    const auto quantised = tracked_steps(steps);
+    StageClock clock(work.stages);
+    LeveledIntraOptions options;
+    options.step = LatticeUnits(tracking_numbers.levels_step * quantised.geometry);
+    options.threads = configuration.threads;
+    auto leveled = encode_leveled_intra(source, options);
+    if (!leveled) return tl::unexpected(leveled.error());
+    CodedIntra coded;
+    auto frame = put_leveled_intra(std::move(*leveled), tracking_numbers.referred_level, coded.payload);
+    clock.done("levels");
+    auto& mesh = coded.decoded = std::move(frame.mesh);
+    coded.detail = std::move(frame.detail);
+    if (coded.detail.vertices() > most_detail * mesh.positions.size()) return std::optional<TrackedIntra>();
+    const auto normals = vertex_normals(mesh.positions, mesh.triangles);
+    if (!source.colours.empty()) {
+        mesh.colours.resize(mesh.positions.size());
+        const auto bulges = bulges_of(coded.detail, mesh.positions, mesh.triangles);
+        const auto targets = find_tracked_targets(
+            {mesh.positions, normals, mesh.triangles, mesh.colours, bulges}, source, surface,
+            {.reach = configuration.scale.on_lattice(tracking_numbers.reach), .threads = configuration.threads});
+        mesh.colours = recoloured(mesh.colours, targets.colours);
+    }
+    if (!source.normals.empty()) mesh.normals = quantised_normals(normals);
+    if (auto ok = encode_intra_attributes(mesh, quantised.colour, coded.payload, configuration.threads); !ok)
+        return tl::unexpected(ok.error());
+    const auto captured = counts_of(work.captured.mesh);
+    coded.payload.header.source_vertices = captured.vertices;
+    coded.payload.header.source_triangles = captured.triangles;
+    coded.payload.set(Layer::pose, encode_pose(work.captured.pose));
+    clock.done("intra coding");
+    auto sent = sent_as(work, std::move(coded), {}, renewal, steps, IntraUse::reference, reason);
+    if (!sent) return tl::unexpected(sent.error());
+    return std::optional(std::move(*sent));
+}
+
+// Whether I-frames that are referred to are coded as a base and its levels.
+bool codes_levels(const TrackedWork& work) {
+    const auto& configuration = work.configuration;
+    const auto& options = configuration.options;
+    const auto& mesh = work.captured.mesh;
+    const auto wanted = options.tracked.levels;
+    if (wanted == ReferenceLevels::off || (wanted == ReferenceLevels::automatic && options.tracked.effort < 3))
+        return false;
+    return !options.intra_coder && !configuration.tells_presence() &&
+           options.texture.layout == TextureLayout::none && mesh.texcoords.empty() && carries_surface(mesh) &&
+           !configuration.intra_only();
 }
 
 Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameSteps& steps, IntraUse use,
                                            FrameReason reason) {
+    if (use == IntraUse::reference && codes_levels(work)) {
+        auto leveled = code_levels(work, work.captured.mesh, work.surface, false, steps, reason);
+        if (!leveled) return tl::unexpected(leveled.error());
+        if (*leveled) return std::move(**leveled);
+    }
     const bool simplify = work.configuration.options.tracked.simplify > 0 && carries_surface(work.captured.mesh);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
     return code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use, reason);
@@ -169,6 +240,7 @@ Result<EncodedTrackedFrame> encode(const TrackedWork& work, const NodeRegistrati
     options.motion_alone = parts == MotionParts::motion_alone;
     options.target_samples = work.effort.target_samples;
     options.near = near;
+    options.detail = &work.reference->decoded.detail;
     if (configuration.tells_presence()) {
         options.presence_options = presence_options(configuration);
         options.presence_before = &work.sequence.history.presence;
@@ -335,6 +407,7 @@ Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const No
     frame.renewed =
         vertices > 0 ? static_cast<double>(vertices - patched->stays.size()) / static_cast<double>(vertices) : 0;
     frame.decoded = std::move(patched->mesh);
+    frame.detail = detail_that_stays(reference.decoded.detail, mesh.positions.size(), patched->stays, frame.decoded);
     if (by_nodes.has_presence) {
         frame.presence = presence_of_patched(tracked.state.presence, patched->stays, vertices);
         out.presence = on_new_reference(tracked.presence, patched->stays, vertices);

@@ -199,8 +199,10 @@ TrackedTargets targets_of(const FrameSource& source, const MovedSurface& moved) 
         if (!reference.mesh.colours.empty()) none.colours.resize(3 * moved.positions.size());
         return none;
     }
+    const auto bulges = options.detail ? bulges_of(*options.detail, moved.positions, reference.mesh.triangles)
+                                       : std::vector<Bulge>{};
     return find_tracked_targets(
-        {moved.positions, moved.normals, reference.mesh.triangles, reference.mesh.colours}, captured, surface,
+        {moved.positions, moved.normals, reference.mesh.triangles, reference.mesh.colours, bulges}, captured, surface,
         {.reach = options.reach,
          .far = options.scale.on_lattice(tracking_numbers.far_from_seen),
          .samples = options.target_samples,

@@ -78,7 +78,7 @@ Result<std::shared_ptr<TrackedReference>> reference_of(const TrackedWork& work, 
     const bool referred_to = !configuration.intra_only() || configuration.options.rate.bits_per_second > 0;
     auto decoded = make_reference(
         configuration.header,
-        {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured, frame.presence},
+        {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured, frame.presence, frame.detail},
         frame.decoded, std::move(pose),
         {.bones = referred_to && configuration.header.has_skeleton, .nodes = referred_to}, configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
@@ -198,7 +198,7 @@ Result<TrackedHandout> hand_out(TrackedStrategy& strategy, TrackedWork& work, Tr
         return tl::unexpected(ok.error());
     const auto& reference = strategy.sequence.reference;
     out.frames.push_back(outgoing(configuration, std::move(coded_frame(chosen)),
-                                  reference ? &reference->decoded.textured : nullptr, strategy.sequence.next_frame,
+                                  reference ? &reference->decoded : nullptr, strategy.sequence.next_frame,
                                   work.captured.timestamp_us, cost));
     return out;
 }

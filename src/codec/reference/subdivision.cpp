@@ -1,4 +1,4 @@
-#include "codec/intra/subdivision.h"
+#include "codec/reference/subdivision.h"
 
 #include <algorithm>
 
@@ -179,20 +179,33 @@ Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<cons
     return out;
 }
 
+LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, double displacement) {
+    // To the nearest, halves up: cutting off rounds down once what is below zero is corrected.
+    const auto along = [&](std::size_t i) {
+        const double moved = expected[i] + normal[i] * displacement + 0.5;
+        const auto whole = static_cast<std::int64_t>(moved);
+        return within_lattice(whole - (moved < static_cast<double>(whole)));
+    };
+    return {along(0), along(1), along(2)};
+}
+
 namespace {
 
-// Cuts the triangles whose edges have a new vertex, and calls part(corners, sides) with each that comes of it. places:
-// of all vertices, old and new. vertex_of_edge: the number of each edge's new vertex, or no_element. Sides have a
-// number each that tells them from all others: twice that of an edge, and one more for its upper half if it is split;
-// after those, three for the sides that are new within each triangle.
+// Cuts the triangles whose edges have a new vertex, and calls part(parent, corners, sides) with each that comes of it, in
+// their order. places: of the old vertices; a new one lies in the middle of its edge. vertex_of_edge: the number of each
+// edge's new vertex, or no_element. Sides have a number each that tells them from all others: twice that of an edge, and
+// one more for its upper half if it is split; after those, three for the sides that are new within each triangle.
 template <class Part>
 void cut_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
                    std::span<const std::uint32_t> vertex_of_edge, std::span<const Vector3d> places, const Part& part) {
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
         const auto& corners = triangles[t];
+        const auto cut = [&](const Triangle& of_part, const std::array<std::uint32_t, 3>& its_sides) {
+            part(t, of_part, its_sides);
+        };
         const auto& sides = edges.of_triangle[t];
         if (sides[0] == no_element) {
-            part(corners, sides);
+            cut(corners, sides);
             continue;
         }
         std::array<std::uint32_t, 3> middle;
@@ -202,7 +215,7 @@ void cut_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
             split += middle[i] != no_element;
         }
         if (split == 0) {
-            part(corners, {2 * sides[0], 2 * sides[1], 2 * sides[2]});
+            cut(corners, {2 * sides[0], 2 * sides[1], 2 * sides[2]});
             continue;
         }
         // Turned so that the side that is split, or is not, where one is alone, is the first.
@@ -215,25 +228,26 @@ void cut_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
             const auto e = sides[(k + side) % 3];
             return 2 * e + (end != edges.ends[e][0]);
         };
-        const auto inside = static_cast<std::uint32_t>(2 * edges.size() + 3 * t);
+        const auto inside = static_cast<std::uint32_t>(2 * edges.size() + std::size_t{3} * t);
         if (split == 1) {
-            part({a, ab, c}, {half(0, a), inside, whole(2)});
-            part({ab, b, c}, {half(0, b), whole(1), inside});
+            cut({a, ab, c}, {half(0, a), inside, whole(2)});
+            cut({ab, b, c}, {half(0, b), whole(1), inside});
         } else if (split == 2) {
-            const Vector3d from_a = places[bc] - places[a], from_b = places[ca] - places[b];
+            const Vector3d from_a = (places[b] + places[c]) * 0.5 - places[a];
+            const Vector3d from_b = (places[c] + places[a]) * 0.5 - places[b];
             if (dot(from_a, from_a) <= dot(from_b, from_b)) {
-                part({a, b, bc}, {whole(0), half(1, b), inside});
-                part({a, bc, ca}, {inside, inside + 1, half(2, a)});
+                cut({a, b, bc}, {whole(0), half(1, b), inside});
+                cut({a, bc, ca}, {inside, inside + 1, half(2, a)});
             } else {
-                part({a, b, ca}, {whole(0), inside, half(2, a)});
-                part({b, bc, ca}, {half(1, b), inside + 1, inside});
+                cut({a, b, ca}, {whole(0), inside, half(2, a)});
+                cut({b, bc, ca}, {half(1, b), inside + 1, inside});
             }
-            part({ca, bc, c}, {inside + 1, half(1, c), half(2, c)});
+            cut({ca, bc, c}, {inside + 1, half(1, c), half(2, c)});
         } else {
-            part({a, ab, ca}, {half(0, a), inside, half(2, a)});
-            part({ab, b, bc}, {half(0, b), half(1, b), inside + 1});
-            part({ca, bc, c}, {inside + 2, half(1, c), half(2, c)});
-            part({ab, bc, ca}, {inside + 1, inside + 2, inside});
+            cut({a, ab, ca}, {half(0, a), inside, half(2, a)});
+            cut({ab, b, bc}, {half(0, b), half(1, b), inside + 1});
+            cut({ca, bc, c}, {inside + 2, half(1, c), half(2, c)});
+            cut({ab, bc, ca}, {inside + 1, inside + 2, inside});
         }
     }
 }
@@ -276,64 +290,87 @@ private:
 
 }  // namespace
 
+std::optional<SubdivisionLevel> split_edges(std::span<const Vector3d> places, std::span<const Triangle> triangles,
+                                            const MeshEdges& edges, std::span<const std::uint8_t> split,
+                                            std::size_t most_vertices, MeshEdges* next) {
+    SubdivisionLevel level;
+    level.first = static_cast<std::uint32_t>(places.size());
+    std::vector<std::uint32_t> wanted, vertex_of_edge(edges.size(), no_element);
+    for (std::uint32_t e = 0; e < edges.size(); ++e) {
+        if (split[e] == 0) continue;
+        vertex_of_edge[e] = static_cast<std::uint32_t>(level.first + wanted.size());
+        wanted.push_back(e);
+    }
+    if (wanted.size() > most_vertices - std::min<std::size_t>(level.first, most_vertices)) return std::nullopt;
+    // Triangles may lie on each other, and grow though vertices do not.
+    std::size_t cut = triangles.size();
+    for (const auto e : wanted) cut += edges.sides[e];
+    if (cut > 4 * most_vertices) return std::nullopt;
+    level.stencils = edge_stencils(places.size(), triangles, edges, wanted);
+    level.beside.reserve(wanted.size());
+    for (const auto own : wanted) {
+        std::array<std::uint32_t, 4> beside{no_element, no_element, no_element, no_element};
+        std::size_t count = 0;
+        for (const auto t : edges.triangles[own]) {
+            if (t == no_element) continue;
+            for (const auto e : edges.of_triangle[t])
+                if (e < own && vertex_of_edge[e] != no_element) beside[count++] = vertex_of_edge[e];
+        }
+        level.beside.push_back(beside);
+    }
+    level.triangles.reserve(cut);
+    level.parent.reserve(cut);
+    std::optional<EdgesOfParts> parts;
+    if (next) parts.emplace(edges, triangles.size(), cut);
+    cut_triangles(triangles, edges, vertex_of_edge, places,
+                  [&](std::uint32_t parent, const Triangle& corners, const std::array<std::uint32_t, 3>& sides) {
+                      level.triangles.push_back(corners);
+                      level.parent.push_back(parent);
+                      if (parts) parts->add(corners, sides);
+                  });
+    if (next) *next = parts->take();
+    return level;
+}
+
 std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
-                                                       std::size_t most_vertices) {
+                                                       std::size_t most_vertices, MeshEdges* finest) {
     std::vector<SubdivisionLevel> out;
     // Where vertices lie on the base: halves of integers at most most_levels times, so exact.
     std::vector<Vector3d> flat;
     for (const auto p : base.positions) flat.push_back(to_vector(p));
-    std::vector<std::uint32_t> split, vertex_of_edge;
+    std::vector<std::uint8_t> split;
     // Two triangles that lie on each other have edges of their own from the first level on.
-    auto edges = depth.levels > 0 ? find_edges(flat.size(), base.triangles) : MeshEdges{};
+    auto edges = depth.levels > 0 || finest ? find_edges(flat.size(), base.triangles) : MeshEdges{};
     for (std::uint32_t k = 1; k <= depth.levels; ++k) {
         const std::span<const Triangle> triangles = out.empty() ? base.triangles : out.back().triangles;
-        SubdivisionLevel level;
-        level.first = static_cast<std::uint32_t>(flat.size());
         const double longest = static_cast<double>(std::int64_t{depth.longest_edge} << (depth.levels - k));
-        split.clear();
-        vertex_of_edge.assign(edges.size(), no_element);
+        split.resize(edges.size());
         for (std::uint32_t e = 0; e < edges.size(); ++e) {
             const Vector3d side = flat[edges.ends[e][1]] - flat[edges.ends[e][0]];
-            if (!(dot(side, side) > longest * longest)) continue;
-            vertex_of_edge[e] = static_cast<std::uint32_t>(level.first + split.size());
-            split.push_back(e);
+            split[e] = dot(side, side) > longest * longest;
         }
-        if (split.size() > most_vertices - std::min<std::size_t>(level.first, most_vertices)) return std::nullopt;
-        // Triangles may lie on each other, and grow though vertices do not.
-        std::size_t cut = triangles.size();
-        for (std::uint32_t e = 0; e < edges.size(); ++e)
-            if (vertex_of_edge[e] != no_element) cut += edges.sides[e];
-        if (cut > 4 * most_vertices) return std::nullopt;
-        level.beside.reserve(split.size());
-        flat.reserve(flat.size() + split.size());
-        level.stencils = edge_stencils(flat.size(), triangles, edges, split);
-        for (const auto own : split) {
-            std::array<std::uint32_t, 4> beside{no_element, no_element, no_element, no_element};
-            std::size_t count = 0;
-            for (const auto t : edges.triangles[own]) {
-                if (t == no_element) continue;
-                for (const auto e : edges.of_triangle[t])
-                    if (e < own && vertex_of_edge[e] != no_element) beside[count++] = vertex_of_edge[e];
-            }
-            level.beside.push_back(beside);
-        }
-        for (const auto e : split) flat.push_back((flat[edges.ends[e][0]] + flat[edges.ends[e][1]]) * 0.5);
-        level.triangles.reserve(cut);
-        if (k == depth.levels) {
-            cut_triangles(triangles, edges, vertex_of_edge, flat,
-                          [&](const Triangle& corners, const std::array<std::uint32_t, 3>&) {
-                              level.triangles.push_back(corners);
-                          });
-        } else {
-            EdgesOfParts next(edges, triangles.size(), cut);
-            cut_triangles(triangles, edges, vertex_of_edge, flat,
-                          [&](const Triangle& corners, const std::array<std::uint32_t, 3>& sides) {
-                              level.triangles.push_back(corners);
-                              next.add(corners, sides);
-                          });
-            edges = next.take();
-        }
-        out.push_back(std::move(level));
+        MeshEdges next;
+        auto level = split_edges(flat, triangles, edges, split, most_vertices,
+                                 k < depth.levels || finest ? &next : nullptr);
+        if (!level) return std::nullopt;
+        flat.reserve(flat.size() + level->stencils.size());
+        for (const auto& s : level->stencils) flat.push_back((flat[s.a] + flat[s.b]) * 0.5);
+        edges = std::move(next);
+        out.push_back(std::move(*level));
+    }
+    if (finest) *finest = std::move(edges);
+    return out;
+}
+
+std::vector<std::uint8_t> bent_edges(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
+                                     const MeshEdges& edges, double least) {
+    std::vector<std::uint8_t> out(edges.size());
+    for (std::size_t e = 0; e < edges.size(); ++e) {
+        EdgeStencil ends;
+        ends.a = edges.ends[e][0];
+        ends.b = edges.ends[e][1];
+        const Vector3d off = tangents_offset(positions, normals, ends);
+        out[e] = dot(off, off) >= least * least;
     }
     return out;
 }

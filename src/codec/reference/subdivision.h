@@ -66,12 +66,16 @@ Vector3d tangents_offset(std::span<const LatticePoint> positions, std::span<cons
 Vector3d expected_vertex(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                          const EdgeStencil& stencil, const SubdivisionRule& rule);
 
+// Where a vertex comes to lie that is displaced along its normal, by so many lattice units.
+LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, double displacement);
+
 struct SubdivisionLevel {
     std::uint32_t first = 0;            // the number of its first new vertex
     std::vector<EdgeStencil> stencils;  // of each new vertex
     // The new vertices before it on the other sides of the triangles beside its edge, or no_element.
     std::vector<std::array<std::uint32_t, 4>> beside;
-    std::vector<Triangle> triangles;  // after it
+    std::vector<Triangle> triangles;    // after it
+    std::vector<std::uint32_t> parent;  // of each triangle, which one it was cut from
 };
 
 struct SubdivisionDepth {
@@ -86,8 +90,21 @@ inline constexpr std::uint32_t most_levels = 8;
 // All levels of a base mesh. They follow from the base alone, not from how its surface is moved: lengths are those on
 // the base's flat triangles. Where two sides of a triangle are split, the quadrangle that remains is cut along its
 // diagonal that is shorter there. Triangles follow in the order of those that they are cut from. base: on the lattice,
-// indices in range. Nothing if there would be more vertices than these.
+// indices in range. finest: if given, set to the edges of the last level. Nothing if there would be more vertices than
+// these.
 std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
-                                                       std::size_t most_vertices);
+                                                       std::size_t most_vertices, MeshEdges* finest = nullptr);
+
+// One level more, which splits the edges that are said. edges: of the triangles. split: one per edge, 1 or 0. places: of
+// the vertices; where two sides of a triangle are split, they say along which diagonal it is cut. next: if given, set to
+// the level's edges. Nothing if there would be more vertices than these.
+std::optional<SubdivisionLevel> split_edges(std::span<const Vector3d> places, std::span<const Triangle> triangles,
+                                            const MeshEdges& edges, std::span<const std::uint8_t> split,
+                                            std::size_t most_vertices, MeshEdges* next = nullptr);
+
+// Which edges the tangent planes' rule moves off their middle by so much or more: 1; else 0. normals: of unit length or
+// zero, one per vertex.
+std::vector<std::uint8_t> bent_edges(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
+                                     const MeshEdges& edges, double least);
 
 }  // namespace htvm::internal

@@ -1,0 +1,80 @@
+#include "codec/intra/leveled_frame.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "codec/intra/intra_frame.h"
+#include "core/bytes.h"
+
+namespace htvm::internal {
+namespace {
+
+Result<LeveledFrame> corrupt(const char* what) {
+    return fail(ErrorKind::corrupt_stream, std::string("I-frame: ") + what);
+}
+
+}  // namespace
+
+LeveledFrame leveled_frame(const SurfaceLevels& levels, LeveledSurface surface, std::uint32_t referred) {
+    LeveledFrame out;
+    const auto last = std::min<std::size_t>(referred, surface.subdivision.size());
+    const auto vertices = last < surface.subdivision.size() ? surface.subdivision[last].first : surface.positions.size();
+    out.mesh.triangles = surface.triangles_above(last + 1);
+    out.mesh.positions = std::move(surface.positions);
+    out.mesh.positions.resize(vertices);
+    auto& detail = out.detail;
+    for (std::size_t k = last; k < surface.subdivision.size(); ++k) {
+        detail.levels.push_back(std::move(surface.subdivision[k]));
+        detail.rules.push_back(levels.rules[k]);
+    }
+    detail.displacements.assign(surface.displacements.begin() + static_cast<std::ptrdiff_t>(vertices),
+                                surface.displacements.end());
+    if (detail.displacements.empty()) detail = {};
+    return out;
+}
+
+std::vector<std::uint8_t> write_levels_layer(std::uint32_t referred, CapturedCounts base,
+                                             std::span<const std::uint8_t> payload) {
+    ByteWriter out;
+    out.u8(static_cast<std::uint8_t>(referred));
+    out.varint(base.vertices);
+    out.varint(base.triangles);
+    out.bytes(payload);
+    return out.take();
+}
+
+Result<LeveledFrame> decode_leveled_frame(const FramePayloadView& payload, std::size_t most_vertices, Threads threads) {
+    const auto layer = payload.of(Layer::levels);
+    ByteReader in(layer);
+    const std::uint32_t referred = in.u8();
+    const std::uint64_t vertices = in.varint(), triangles = in.varint();
+    if (!in.ok() || referred > most_levels) return corrupt("the layer of its levels is cut off, or names one too many");
+    const auto& counts = payload.header;
+    if (vertices > counts.vertices || triangles > counts.triangles)
+        return corrupt("its base is larger than its mesh");
+    FramePayloadView of_base;
+    of_base.header = counts;
+    of_base.header.vertices = static_cast<std::uint32_t>(vertices);
+    of_base.header.triangles = static_cast<std::uint32_t>(triangles);
+    of_base.header.intra_coder = intra_coder_tfan;
+    for (const auto coded : {Layer::fans, Layer::geometry}) {
+        const auto i = static_cast<std::size_t>(coded);
+        of_base.layers[i] = payload.layers[i];
+        of_base.present[i] = payload.present[i];
+    }
+    const auto base = decode_intra_frame(of_base, nullptr, threads);
+    if (!base) return tl::unexpected(base.error());
+    const auto runs = layer.subspan(in.position());
+    const auto header = read_levels_header(runs);
+    if (!header) return tl::unexpected(header.error());
+    const std::size_t most = std::min(most_vertices, (most_detail + 1) * std::size_t{counts.vertices});
+    auto surface = decode_surface_levels(runs, *base, most);
+    if (!surface) return tl::unexpected(surface.error());
+    auto out = leveled_frame(header->levels, std::move(*surface), referred);
+    if (out.mesh.positions.size() != counts.vertices || out.mesh.triangles.size() != counts.triangles)
+        return corrupt("its mesh is not what its header says");
+    if (auto ok = decode_intra_attributes(payload, out.mesh, threads); !ok) return tl::unexpected(ok.error());
+    return out;
+}
+
+}  // namespace htvm::internal
