@@ -34,7 +34,7 @@ struct Options {
     std::vector<std::size_t> at{0};
     std::vector<double> qualities{20, 30, 40, 50, 60, 70, 80, 90, 100};
     std::vector<double> steps{0.75, 1, 1.4, 2, 2.6, 3.5};  // mm
-    std::vector<double> errors{0.4, 0.8};                   // mm
+    std::vector<double> errors{0.4, 0.8};                  // mm
     std::uint64_t samples = 200000;
     LeveledIntraOptions levels;
     bool json = false;
@@ -282,7 +282,8 @@ void add_hierarchy(CLI::App& app, app::Run& run) {
                      "How often the base is made finer where much is left (default 1)")
         ->check(CLI::Range(0, 10));
     command
-        ->add_option("--longest-edge", levels.longest_edge, "Longest edge of the finest coded level, in steps (default 9.9)")
+        ->add_option("--longest-edge", levels.longest_edge,
+                     "Longest edge of the finest coded level, in steps (default 9.9)")
         ->check(CLI::Range(0.01, 1000.0));
     command->add_option("--coarser", levels.coarser, "A level's step in sixteenths of that below (default 12)")
         ->check(CLI::Range(1u, 16u));

@@ -46,8 +46,8 @@ enum class TrackedReferences : std::uint8_t {
                // refers to the reference alone
 };
 
-// Whether the meshes that T-frames refer to are coded as a base mesh, subdivided, with detail as displacements. They take
-// about half the bits, and a second or more of encoding each.
+// Whether the meshes that T-frames refer to are coded as a base mesh, subdivided, with detail as displacements. They
+// take about half the bits, and a second or more of encoding each.
 enum class ReferenceLevels : std::uint8_t {
     automatic,  // from effort 3 on, where surface does not come and go and there is no texture
     off,

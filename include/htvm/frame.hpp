@@ -53,13 +53,14 @@ enum class Layer : std::uint8_t {
     distance_orders = 9,
     external_intra = 10,  // a whole mesh, coded by another coder
     coded_bones = 11,
-    tracked = 12,   // a T-frame's payload
-    removed = 13,   // what a patch takes out
-    border = 14,    // where a patch is joined
-    charts = 15,    // how triangles lie in the texture's picture
-    presence = 16,  // which vertices are there
-    reason = 17,    // why the encoder sent the frame: a FrameReason
-    levels = 18,    // of the surface of a base mesh
+    tracked = 12,        // a T-frame's payload
+    removed = 13,        // what a patch takes out
+    border = 14,         // where a patch is joined
+    charts = 15,         // how triangles lie in the texture's picture
+    presence = 16,       // which vertices are there
+    reason = 17,         // why the encoder sent the frame: a FrameReason
+    levels = 18,         // of the surface of a base mesh
+    level_colours = 19,  // of the detail of such a surface
 };
 
 struct LayerName {
@@ -85,6 +86,7 @@ inline constexpr std::array frame_layers = {
     LayerName{Layer::presence, "presence"},
     LayerName{Layer::reason, "reason"},
     LayerName{Layer::levels, "levels"},
+    LayerName{Layer::level_colours, "level colours"},
 };
 inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // the largest number plus one; 0 is not a layer
 

@@ -316,7 +316,7 @@ htvm_status htvm_decoder_global_shift(htvm_decoder* decoder, int64_t* shift);
 /* Where the current frame's bytes went: bytes[0] headers, counts and checksums, bytes[n] the layer of number n
  * (docs/bitstream.md, section 4). HTVM_LAYERS numbers are always enough. HTVM_BAD_INPUT: there is no current frame.
  * HTVM_BUFFER_TOO_SMALL below HTVM_LAYERS. */
-enum { HTVM_LAYERS = 19 };
+enum { HTVM_LAYERS = 20 };
 htvm_status htvm_decoder_layer_bytes(htvm_decoder* decoder, uint64_t* bytes, size_t capacity);
 /* What people call layer n: "geometry"; "overhead" for 0. NULL where there is no such layer. */
 const char* htvm_layer_name(uint32_t layer);

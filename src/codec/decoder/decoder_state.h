@@ -57,7 +57,7 @@ struct ShownFrame {
     Presence presence;                    // one per vertex; none: all are there
     LatticeMesh fine;                     // what is shown of a mesh with detail; its triangles are the detail's
     Presence fine_presence;
-    LatticeMesh own;                      // the mesh of a frame that shares nothing with its reference
+    LatticeMesh own;  // the mesh of a frame that shares nothing with its reference
     Pose pose;
 };
 

@@ -20,7 +20,8 @@ Result<IntraMesh> decode_mesh(const DecoderState& state, const Packet& packet, c
     if (payload.header.intra_coder == intra_coder_levels) {
         // What is kept of a vertex of the detail takes about as much memory as what is of others.
         constexpr std::uint64_t bytes_of_vertex = 1024;
-        const auto most = std::min<std::uint64_t>(state.options.max_vertices, state.options.max_memory / bytes_of_vertex);
+        const auto most =
+            std::min<std::uint64_t>(state.options.max_vertices, state.options.max_memory / bytes_of_vertex);
         auto leveled = decode_leveled_frame(payload, static_cast<std::size_t>(most), state.threads);
         if (!leveled) return tl::unexpected(leveled.error());
         return IntraMesh{std::move(leveled->mesh), std::move(leveled->detail)};
@@ -67,8 +68,8 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     if (!referred) {
-        UnreferredIntra unreferred{packet.frame,      topology,         std::move(mesh),
-                                   std::move(detail), std::move(*textured), std::move(shown)};
+        UnreferredIntra unreferred{packet.frame,         topology,        std::move(mesh), std::move(detail),
+                                   std::move(*textured), std::move(shown)};
         show(state, view_of(unreferred), topology, unreferred.pose);
         state.unreferred = std::move(unreferred);
         return {};

@@ -43,13 +43,13 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     Presence presence;
     if (reference.has_presence)
         presence = presence_of_patched(tracked.state.presence, patched->stays, mesh.positions.size());
-    ReferenceFacts facts{.number = packet.frame,
-                         .captured = {payload.header.source_vertices, payload.header.source_triangles},
-                         .kept = keep_nodes(reference.nodes, patched->stays),
-                         .textured = std::move(*textured),
-                         .presence = std::move(presence),
-                         .detail = detail_that_stays(state.reference->detail, reference.mesh.positions.size(),
-                                                     patched->stays, mesh)};
+    ReferenceFacts facts{
+        .number = packet.frame,
+        .captured = {payload.header.source_vertices, payload.header.source_triangles},
+        .kept = keep_nodes(reference.nodes, patched->stays),
+        .textured = std::move(*textured),
+        .presence = std::move(presence),
+        .detail = detail_that_stays(state.reference->detail, reference.mesh.positions.size(), patched->stays, mesh)};
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     // Its nodes are for the next frame to derive, or for the time between, so that no frame has to do the work of two.

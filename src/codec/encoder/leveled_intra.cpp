@@ -62,9 +62,8 @@ Result<LeveledIntra> encode_leveled_intra(const LatticeMesh& captured, const Lev
 LeveledFrame put_leveled_intra(LeveledIntra coded, std::uint32_t referred, FramePayload& payload) {
     payload.header = coded.base.header;
     for (const auto layer : {Layer::fans, Layer::geometry}) payload.set(layer, coded.base.of(layer));
-    payload.set(Layer::levels,
-                write_levels_layer(referred, {coded.base.header.vertices, coded.base.header.triangles},
-                                   coded.levels.payload));
+    payload.set(Layer::levels, write_levels_layer(referred, {coded.base.header.vertices, coded.base.header.triangles},
+                                                  coded.levels.payload));
     auto out = leveled_frame(coded.settings, std::move(coded.levels.surface), referred);
     payload.header.vertices = static_cast<std::uint32_t>(out.mesh.positions.size());
     payload.header.triangles = static_cast<std::uint32_t>(out.mesh.triangles.size());

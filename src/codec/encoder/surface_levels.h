@@ -26,7 +26,8 @@ struct EncodedSurfaceLevels {
         std::size_t vertices = 0, moved = 0;  // and how many of them are displaced
         std::size_t bytes = 0;
     };
-    std::vector<Part> parts;  // the base's displacements, then each level's; that of the one that rounds off has no bytes
+    std::vector<Part>
+        parts;  // the base's displacements, then each level's; that of the one that rounds off has no bytes
 };
 
 // captured: evenly_sampled(). base: decoded, with triangles. Errors: limit if there would be too many vertices.

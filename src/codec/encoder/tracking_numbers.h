@@ -22,7 +22,7 @@ struct TrackingNumbers {
     double coarser_colours = 1.3;  // step of an I-frame's colours, likewise
     double coarser_tracked_colours = 6;  // step of a T-frame's colours, likewise: re-meshing alone makes the colour at
                                          // one place vary, and finer steps code that noise
-    double levels_step = 1.15;  // step of an I-frame's finest displacements, where it has levels, in steps of positions
+    double levels_step = 0.85;  // step of an I-frame's finest displacements, where it has levels, in steps of positions
     std::uint32_t referred_level = 1;  // the level that T-frames refer to
     double finer_renewed = 0.5;  // step of an I-frame made of the tracked mesh, in steps of one made of the capture:
                                  // what is quantised already would err twice as far, and jump

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "codec/intra/intra_frame.h"
+#include "codec/intra/level_colours.h"
 #include "core/bytes.h"
 
 namespace htvm::internal {
@@ -18,7 +19,8 @@ Result<LeveledFrame> corrupt(const char* what) {
 LeveledFrame leveled_frame(const SurfaceLevels& levels, LeveledSurface surface, std::uint32_t referred) {
     LeveledFrame out;
     const auto last = std::min<std::size_t>(referred, surface.subdivision.size());
-    const auto vertices = last < surface.subdivision.size() ? surface.subdivision[last].first : surface.positions.size();
+    const auto vertices =
+        last < surface.subdivision.size() ? surface.subdivision[last].first : surface.positions.size();
     out.mesh.triangles = surface.triangles_above(last + 1);
     out.mesh.positions = std::move(surface.positions);
     out.mesh.positions.resize(vertices);
@@ -50,8 +52,7 @@ Result<LeveledFrame> decode_leveled_frame(const FramePayloadView& payload, std::
     const std::uint64_t vertices = in.varint(), triangles = in.varint();
     if (!in.ok() || referred > most_levels) return corrupt("the layer of its levels is cut off, or names one too many");
     const auto& counts = payload.header;
-    if (vertices > counts.vertices || triangles > counts.triangles)
-        return corrupt("its base is larger than its mesh");
+    if (vertices > counts.vertices || triangles > counts.triangles) return corrupt("its base is larger than its mesh");
     FramePayloadView of_base;
     of_base.header = counts;
     of_base.header.vertices = static_cast<std::uint32_t>(vertices);
@@ -74,6 +75,13 @@ Result<LeveledFrame> decode_leveled_frame(const FramePayloadView& payload, std::
     if (out.mesh.positions.size() != counts.vertices || out.mesh.triangles.size() != counts.triangles)
         return corrupt("its mesh is not what its header says");
     if (auto ok = decode_intra_attributes(payload, out.mesh, threads); !ok) return tl::unexpected(ok.error());
+    if (!payload.has(Layer::level_colours)) return out;
+    if (out.mesh.colours.empty() || out.detail.empty()) return corrupt("it has colours of levels that it has not");
+    if (auto ok = decode_level_colours(
+            payload.of(Layer::level_colours), out.mesh.colours, static_cast<std::int32_t>(counts.colour_step),
+            header->levels.depth.levels - std::min(referred, header->levels.depth.levels), out.detail);
+        !ok)
+        return tl::unexpected(ok.error());
     return out;
 }
 

@@ -1,6 +1,6 @@
-// An I-frame as a base mesh and the levels of its surface (docs/bitstream.md, section 8.21). The base is coded as a mesh
-// of its own; the levels follow in a layer. Frames refer to the mesh of one of the first levels, which has the frame's
-// attributes; those below it are its detail, which it is shown with.
+// An I-frame as a base mesh and the levels of its surface (docs/bitstream.md, section 8.21). The base is coded as a
+// mesh of its own; the levels follow in a layer. Frames refer to the mesh of one of the first levels, which has the
+// frame's attributes; those below it are its detail, which it is shown with.
 //
 // Layer: the level that frames refer to (8 bits), the base's vertices and triangles (varints), then a payload of
 // surface_levels.h. The frame's header counts the mesh that frames refer to.
@@ -18,8 +18,8 @@
 
 namespace htvm::internal {
 
-// The detail has at most so many vertices for each of the mesh that frames refer to: it bounds what a few bytes can make
-// a decoder do, in this frame and in those that refer to it.
+// The detail has at most so many vertices for each of the mesh that frames refer to: it bounds what a few bytes can
+// make a decoder do, in this frame and in those that refer to it.
 inline constexpr std::size_t most_detail = 32;
 
 struct LeveledFrame {

@@ -108,7 +108,8 @@ Result<SurfaceLevelsHeader> read_levels_header(std::span<const std::uint8_t> pay
     return out;
 }
 
-bool round_off(const SurfaceLevels& levels, const MeshEdges& edges, std::size_t most_vertices, LeveledSurface& surface) {
+bool round_off(const SurfaceLevels& levels, const MeshEdges& edges, std::size_t most_vertices,
+               LeveledSurface& surface) {
     const auto& triangles = surface.finest();
     const double least = displacement_of(static_cast<std::int32_t>(levels.rounded), levels.step) / 32;
     std::vector<Vector3d> places;

@@ -31,7 +31,7 @@ struct SurfaceLevels {
     // Behind the levels that are coded another may follow that only rounds off what is bent: edges that the tangent
     // planes' rule moves off their middle by so many 32nds of the step or more are split, and nothing is displaced. 0:
     // there is none.
-    std::uint32_t rounded = 0;  // 0..255
+    std::uint32_t rounded = 0;                             // 0..255
     std::array<SubdivisionRule, most_levels + 1> rules{};  // of each level, and of the one that rounds off
 };
 
@@ -71,8 +71,9 @@ Result<SurfaceLevelsHeader> read_levels_header(std::span<const std::uint8_t> pay
 
 // The surface that was encoded, down to a level, or to the finest if there are fewer: 0 gives the base, moved. The
 // vertices of these levels lie where they lie in the whole surface; what comes behind their runs is not read, and may
-// be missing. The level that rounds off is the one behind those that are coded. base: its positions are on the lattice, its indices in range. most_vertices: of the level asked for.
-// Errors: those of the header; corrupt_stream if a run is cut off; limit if there would be more vertices.
+// be missing. The level that rounds off is the one behind those that are coded. base: its positions are on the lattice,
+// its indices in range. most_vertices: of the level asked for. Errors: those of the header; corrupt_stream if a run is
+// cut off; limit if there would be more vertices.
 Result<LeveledSurface> decode_surface_levels(std::span<const std::uint8_t> payload, const LatticeMesh& base,
                                              std::size_t most_vertices, std::uint32_t down_to = most_levels + 1);
 

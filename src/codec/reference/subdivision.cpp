@@ -191,10 +191,11 @@ LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, 
 
 namespace {
 
-// Cuts the triangles whose edges have a new vertex, and calls part(parent, corners, sides) with each that comes of it, in
-// their order. places: of the old vertices; a new one lies in the middle of its edge. vertex_of_edge: the number of each
-// edge's new vertex, or no_element. Sides have a number each that tells them from all others: twice that of an edge, and
-// one more for its upper half if it is split; after those, three for the sides that are new within each triangle.
+// Cuts the triangles whose edges have a new vertex, and calls part(parent, corners, sides) with each that comes of it,
+// in their order. places: of the old vertices; a new one lies in the middle of its edge. vertex_of_edge: the number of
+// each edge's new vertex, or no_element. Sides have a number each that tells them from all others: twice that of an
+// edge, and one more for its upper half if it is split; after those, three for the sides that are new within each
+// triangle.
 template <class Part>
 void cut_triangles(std::span<const Triangle> triangles, const MeshEdges& edges,
                    std::span<const std::uint32_t> vertex_of_edge, std::span<const Vector3d> places, const Part& part) {
@@ -350,8 +351,8 @@ std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, 
             split[e] = dot(side, side) > longest * longest;
         }
         MeshEdges next;
-        auto level = split_edges(flat, triangles, edges, split, most_vertices,
-                                 k < depth.levels || finest ? &next : nullptr);
+        auto level =
+            split_edges(flat, triangles, edges, split, most_vertices, k < depth.levels || finest ? &next : nullptr);
         if (!level) return std::nullopt;
         flat.reserve(flat.size() + level->stencils.size());
         for (const auto& s : level->stencils) flat.push_back((flat[s.a] + flat[s.b]) * 0.5);

@@ -95,9 +95,9 @@ inline constexpr std::uint32_t most_levels = 8;
 std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
                                                        std::size_t most_vertices, MeshEdges* finest = nullptr);
 
-// One level more, which splits the edges that are said. edges: of the triangles. split: one per edge, 1 or 0. places: of
-// the vertices; where two sides of a triangle are split, they say along which diagonal it is cut. next: if given, set to
-// the level's edges. Nothing if there would be more vertices than these.
+// One level more, which splits the edges that are said. edges: of the triangles. split: one per edge, 1 or 0. places:
+// of the vertices; where two sides of a triangle are split, they say along which diagonal it is cut. next: if given,
+// set to the level's edges. Nothing if there would be more vertices than these.
 std::optional<SubdivisionLevel> split_edges(std::span<const Vector3d> places, std::span<const Triangle> triangles,
                                             const MeshEdges& edges, std::span<const std::uint8_t> split,
                                             std::size_t most_vertices, MeshEdges* next = nullptr);

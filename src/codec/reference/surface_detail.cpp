@@ -31,18 +31,30 @@ void add_detail(const SurfaceDetail& detail, std::size_t shown, std::span<const 
             const double displacement = detail.displacements[positions.size() - of_reference];
             // Most are not displaced, and then the normal need not be known.
             const Vector3d along = displacement != 0 ? normalised(normals[s.a] + normals[s.b]) : Vector3d{};
-            const auto at = displaced_vertex(expected_vertex(positions, normals, s, detail.rules[k]), along, displacement);
+            const auto at =
+                displaced_vertex(expected_vertex(positions, normals, s, detail.rules[k]), along, displacement);
             positions.push_back(at);
         }
     }
 }
 
+Colour off_mean(const Colour& a, const Colour& b, const std::array<std::int32_t, 3>& more) {
+    Colour out;
+    for (std::size_t c = 0; c < 3; ++c)
+        out[c] = static_cast<std::uint8_t>(std::clamp((a[c] + b[c] + 1) / 2 + more[c], 0, 255));
+    return out;
+}
+
 void add_detail(const SurfaceDetail& detail, std::size_t shown, std::vector<Colour>& colours) {
-    add_means(detail, shown, colours, [](const Colour& a, const Colour& b) {
-        Colour out;
-        for (std::size_t c = 0; c < 3; ++c) out[c] = static_cast<std::uint8_t>((a[c] + b[c] + 1) / 2);
-        return out;
-    });
+    if (colours.empty()) return;
+    std::size_t i = 0;
+    for (std::size_t k = 0; k < shown; ++k)
+        for (const auto& s : detail.levels[k].stencils) {
+            const Colour own = off_mean(colours[s.a], colours[s.b],
+                                        i < detail.colours.size() ? detail.colours[i] : std::array<std::int32_t, 3>{});
+            colours.push_back(own);
+            ++i;
+        }
 }
 
 void add_detail(const SurfaceDetail& detail, std::size_t shown, std::vector<QuantisedNormal>& normals) {
@@ -96,13 +108,16 @@ SurfaceDetail detail_that_stays(const SurfaceDetail& before, std::size_t vertice
         });
         std::vector<std::uint8_t> is_split(edges.size(), 0);
         std::vector<double> displacements;
+        std::vector<std::array<std::int32_t, 3>> colours;
         for (std::size_t e = 0; e < edges.size(); ++e) {
             const auto found = std::lower_bound(splits.begin(), splits.end(), edges.ends[e],
                                                 [](const Split& s, const auto& ends) { return s.ends < ends; });
             if (found == splits.end() || found->ends != edges.ends[e]) continue;
             is_split[e] = 1;
             number[found->vertex] = static_cast<std::uint32_t>(places.size() + displacements.size());
-            displacements.push_back(before.displacements[found->vertex - vertices_before]);
+            const std::size_t own = found->vertex - vertices_before;
+            displacements.push_back(before.displacements[own]);
+            if (own < before.colours.size()) colours.push_back(before.colours[own]);
         }
         MeshEdges next;
         const auto& triangles = k == 0 ? patched.triangles : out.levels.back().triangles;
@@ -113,6 +128,7 @@ SurfaceDetail detail_that_stays(const SurfaceDetail& before, std::size_t vertice
         out.levels.push_back(std::move(*split));
         out.rules.push_back(before.rules[k]);
         out.displacements.insert(out.displacements.end(), displacements.begin(), displacements.end());
+        out.colours.insert(out.colours.end(), colours.begin(), colours.end());
     }
     if (out.displacements.empty()) return {};
     return out;

@@ -3,6 +3,7 @@
 // reference of few vertices, which is all that T-frames code, is shown with the detail of many.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -16,6 +17,9 @@ struct SurfaceDetail {
     std::vector<SubdivisionLevel> levels;  // the first one splits edges of the reference; empty: there is none
     std::vector<SubdivisionRule> rules;    // of each
     std::vector<double> displacements;     // of each vertex of these levels, along its normal, in lattice units
+    // What is added to the mean of its edge's ends, in levels, -255..255 each; of the first vertices: those behind them
+    // have the mean itself.
+    std::vector<std::array<std::int32_t, 3>> colours;
     bool empty() const { return levels.empty(); }
     std::size_t vertices() const { return displacements.size(); }  // beside the reference's
     // The triangles of the first levels; at least one.
@@ -26,10 +30,15 @@ struct SurfaceDetail {
 void add_detail(const SurfaceDetail& detail, std::size_t shown, std::span<const Triangle> triangles,
                 std::vector<LatticePoint>& positions);
 
-// The same of what vertices have beside their positions: a new one has the mean of its edge's ends. Empty ones stay so.
+// The mean of two colours and what is added to it.
+Colour off_mean(const Colour& a, const Colour& b, const std::array<std::int32_t, 3>& more);
+
+// The same of what vertices have beside their positions: a new one has the mean of its edge's ends, and what
+// SurfaceDetail::colours adds to it. Empty ones stay so.
 void add_detail(const SurfaceDetail& detail, std::size_t shown, std::vector<Colour>& colours);
 void add_detail(const SurfaceDetail& detail, std::size_t shown, std::vector<QuantisedNormal>& normals);
-// A new one is there if both ends are, so that whole triangles of the reference are, or are not. presence: see Presence.
+// A new one is there if both ends are, so that whole triangles of the reference are, or are not. presence: see
+// Presence.
 void add_detail(const SurfaceDetail& detail, std::size_t shown, std::vector<std::uint8_t>& presence);
 
 // The mesh with all its detail; without texture coordinates.

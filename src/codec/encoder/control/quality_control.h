@@ -88,8 +88,7 @@ Result<typename Work::Frame> code_to_error(const Work& work, typename Work::Prog
         auto& frame = coded_frame(*chosen);
         frame.quality = quality;
         type = frame.type;
-        const double error =
-            work.configuration.scale.in_space(LatticeUnits(errors_of(work, frame).geometry_rms)).value;
+        const double error = work.configuration.scale.in_space(LatticeUnits(errors_of(work, frame).geometry_rms)).value;
         const bool whatever_quality = rules_of(type).rate == RateClass::moved;
         if (control.accept(type, quality, error) || whatever_quality) return chosen;
         const double off = std::abs(std::log2(error / work.configuration.options.rate.target_error));

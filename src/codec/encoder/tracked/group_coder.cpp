@@ -103,8 +103,8 @@ Result<CodedGroup> code_group(const Configuration& configuration, const TrackedR
         FrameCost cost;
         cost.type = frame.type;
         cost.bits = 8.0 * static_cast<double>(frame.bytes());
-        out.frames.push_back(outgoing(configuration, std::move(frame), &reference.decoded, held[i].number,
-                                      held[i].timestamp_us, cost));
+        out.frames.push_back(
+            outgoing(configuration, std::move(frame), &reference.decoded, held[i].number, held[i].timestamp_us, cost));
         out.frames.back().info.group = static_cast<std::uint8_t>(length);
         out.frames.back().info.place = static_cast<std::uint8_t>(i + 1);
     }

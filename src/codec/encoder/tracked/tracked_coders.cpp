@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "codec/encoder/charts/chart_packing.h"
+#include "codec/encoder/level_colours.h"
 #include "codec/encoder/leveled_intra.h"
 #include "codec/intra/intra_frame.h"
 #include "codec/tracked/frame_group.h"
@@ -160,6 +161,8 @@ Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const L
     clock.done("levels");
     auto& mesh = coded.decoded = std::move(frame.mesh);
     coded.detail = std::move(frame.detail);
+    const std::size_t coded_below =
+        coded.detail.empty() ? 0 : options.levels - std::min(tracking_numbers.referred_level, options.levels);
     if (coded.detail.vertices() > most_detail * mesh.positions.size()) return std::optional<TrackedIntra>();
     const auto normals = vertex_normals(mesh.positions, mesh.triangles);
     if (!source.colours.empty()) {
@@ -173,6 +176,14 @@ Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const L
     if (!source.normals.empty()) mesh.normals = quantised_normals(normals);
     if (auto ok = encode_intra_attributes(mesh, quantised.colour, coded.payload, configuration.threads); !ok)
         return tl::unexpected(ok.error());
+    if (!mesh.colours.empty() && coded_below > 0) {
+        LevelColourOptions colour_options;
+        colour_options.step = quantised.colour;
+        colour_options.reach = configuration.scale.on_lattice(tracking_numbers.reach).value;
+        colour_options.threads = configuration.threads;
+        coded.payload.set(Layer::level_colours,
+                          encode_level_colours(mesh, source, surface, coded_below, colour_options, coded.detail));
+    }
     const auto captured = counts_of(work.captured.mesh);
     coded.payload.header.source_vertices = captured.vertices;
     coded.payload.header.source_triangles = captured.triangles;
@@ -191,9 +202,8 @@ bool codes_levels(const TrackedWork& work) {
     const auto wanted = options.tracked.levels;
     if (wanted == ReferenceLevels::off || (wanted == ReferenceLevels::automatic && options.tracked.effort < 3))
         return false;
-    return !options.intra_coder && !configuration.tells_presence() &&
-           options.texture.layout == TextureLayout::none && mesh.texcoords.empty() && carries_surface(mesh) &&
-           !configuration.intra_only();
+    return !options.intra_coder && !configuration.tells_presence() && options.texture.layout == TextureLayout::none &&
+           mesh.texcoords.empty() && carries_surface(mesh) && !configuration.intra_only();
 }
 
 Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameSteps& steps, IntraUse use,

@@ -199,8 +199,8 @@ TrackedTargets targets_of(const FrameSource& source, const MovedSurface& moved) 
         if (!reference.mesh.colours.empty()) none.colours.resize(3 * moved.positions.size());
         return none;
     }
-    const auto bulges = options.detail ? bulges_of(*options.detail, moved.positions, reference.mesh.triangles)
-                                       : std::vector<Bulge>{};
+    const auto bulges =
+        options.detail ? bulges_of(*options.detail, moved.positions, reference.mesh.triangles) : std::vector<Bulge>{};
     return find_tracked_targets(
         {moved.positions, moved.normals, reference.mesh.triangles, reference.mesh.colours, bulges}, captured, surface,
         {.reach = options.reach,

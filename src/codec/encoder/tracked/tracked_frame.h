@@ -40,7 +40,7 @@ struct TrackedFrameOptions {
     const RemovedNoise* noise = nullptr;         // else: what to take off them
     bool keeps_noise = false;                    // whether to tell what filtering took off
     TargetSamples target_samples = TargetSamples::middles;
-    const SurfaceDetail* detail = nullptr;  // with which the reference is shown; null: none
+    const SurfaceDetail* detail = nullptr;     // with which the reference is shown; null: none
     std::span<const std::uint32_t> near = {};  // EncodedTrackedFrame::near of another attempt, where searches begin;
                                                // none: they begin at the registration's matches
     // Where the stream tells what is there: how that is judged, from the frame before; or what it is to be.
