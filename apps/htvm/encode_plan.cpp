@@ -222,6 +222,8 @@ EncoderOptions encoder_of(const EncodeRequest& request, const Destination& outpu
     if (request.encoding.intra == IntraCoder::draco) out.intra_coder = draco_intra_coder();
     // A run and its repetition make the same of an effort.
     if (out.tracked.group == 0 && (may_not_wait(request) || is_paced(request))) out.tracked.group = 1;
+    // A first frame that takes seconds is none to be watched live.
+    if (!given(request, "tracked.levels") && may_not_wait(request)) out.tracked.levels = ReferenceLevels::off;
     // Nobody waits for the frames of a file.
     if (!given(request, "latency_frames") && !is_piped(request.capture) && !output.may_be_live() &&
         request.deadline == 0 && request.effort_log.empty())

@@ -25,25 +25,24 @@ struct RandomPayload {
 };
 RandomPayload random_payload(const LatticeMesh& base, const SurfaceLevels& levels, unsigned seed, std::int32_t most) {
     std::mt19937 random(seed);
-    const auto subdivision = subdivide(base, levels.depth, 1 << 20);
     std::vector<std::vector<std::uint8_t>> runs;
     DisplacementModels models;
     RandomPayload out;
     std::vector<std::int32_t> values;
     out.surface.triangles = base.triangles;
+    out.surface.subdivision = *subdivide(base, levels.depth, 1 << 20);
     for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) {
-        const auto* level = k > 0 ? &(*subdivision)[k - 1] : nullptr;
+        const auto* level = k > 0 ? &out.surface.subdivision[k - 1] : nullptr;
         const auto expected =
-            level ? ExpectedLevel(*level, out.surface.positions, out.surface.triangles, levels.rules[k - 1])
+            level ? ExpectedLevel(*level, out.surface.positions, out.surface.triangles_above(k), levels.rules[k - 1])
                   : ExpectedLevel(base);
         RangeEncoder encoder;
         WritingCoder<RangeEncoder> coder{encoder};
-        code_displacements(coder, models, level, k, expected, step_at(levels, k), out.surface.positions, values,
+        code_displacements(coder, models, level, k, expected, step_at(levels, k), out.surface, values,
                            [&](std::size_t, const DisplacementContext&) {
                                return random() % 3 == 0 ? static_cast<std::int32_t>(random() % (2u * most + 1)) - most
                                                         : 0;
                            });
-        if (level) out.surface.triangles = level->triangles;
         runs.push_back(encoder.finish());
     }
     out.bytes = write_surface_levels(levels, runs);
@@ -191,9 +190,9 @@ TEST(SurfaceLevels, steps_shrink_towards_the_base_and_never_vanish) {
 }
 
 TEST(SurfaceLevels, a_displaced_vertex_is_rounded_to_the_nearest_and_stays_on_the_lattice) {
-    EXPECT_EQ(displaced_vertex({0.5, -0.5, 10.49}, {0, 0, 0}, 7, 16), (LatticePoint{1, 0, 10}));
-    EXPECT_EQ(displaced_vertex({0, 0, 0}, {0, -1, 0}, 3, 8), (LatticePoint{0, -1, 0}));
-    EXPECT_EQ(displaced_vertex({0, 0, 0}, {1, 0, 0}, most_displacement, 1 << 20), (LatticePoint{lattice_limit, 0, 0}));
+    EXPECT_EQ(displaced_vertex({0.5, -0.5, 10.49}, {0, 0, 0}, 7), (LatticePoint{1, 0, 10}));
+    EXPECT_EQ(displaced_vertex({0, 0, 0}, {0, -1, 0}, displacement_of(3, 8)), (LatticePoint{0, -1, 0}));
+    EXPECT_EQ(displaced_vertex({0, 0, 0}, {1, 0, 0}, displacement_of(most_displacement, 1 << 20)), (LatticePoint{lattice_limit, 0, 0}));
 }
 
 // ---- The encoder ----------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ namespace htvm::internal {
 
 struct LevelColourOptions {
     std::int32_t step = 6;  // of colours, 1..255
-    double lambda = 0.12;   // squared steps, of all components together, that a bit must spare
+    double lambda = 0.2;    // squared steps, of all components together, that a bit must spare
     double reach = 480;     // how far from a vertex the captured surface may lie, lattice units
     Threads threads = {};
 };

@@ -202,20 +202,31 @@ bool codes_levels(const TrackedWork& work) {
     const auto wanted = options.tracked.levels;
     if (wanted == ReferenceLevels::off || (wanted == ReferenceLevels::automatic && options.tracked.effort < 3))
         return false;
-    return !options.intra_coder && !configuration.tells_presence() && options.texture.layout == TextureLayout::none &&
-           mesh.texcoords.empty() && carries_surface(mesh) && !configuration.intra_only();
+    return !options.intra_coder && (!configuration.tells_presence() || wanted == ReferenceLevels::on) && options.texture.layout == TextureLayout::none &&
+           options.tracked.simplify > 0 && mesh.texcoords.empty() && carries_surface(mesh) &&
+           !configuration.intra_only();
+}
+
+// What a coding of the same surface costs: bits where the error is equal, since a bit that is saved there brings so much
+// (docs/experiments/hierarchy.md).
+double price_of(const TrackedWork& work, const CodedFrame& frame) {
+    constexpr double bits_by_error = 1.6;
+    const auto errors = errors_between(work.captured.mesh, work.surface, detailed(frame.detail, frame.decoded),
+                                       work.configuration.threads);
+    return std::log(static_cast<double>(frame.bytes())) + bits_by_error * std::log(std::max(errors.geometry_rms, 1e-6));
 }
 
 Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameSteps& steps, IntraUse use,
                                            FrameReason reason) {
-    if (use == IntraUse::reference && codes_levels(work)) {
-        auto leveled = code_levels(work, work.captured.mesh, work.surface, false, steps, reason);
-        if (!leveled) return tl::unexpected(leveled.error());
-        if (*leveled) return std::move(**leveled);
-    }
     const bool simplify = work.configuration.options.tracked.simplify > 0 && carries_surface(work.captured.mesh);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
-    return code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use, reason);
+    auto flat =
+        code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use, reason);
+    if (!flat || use != IntraUse::reference || !codes_levels(work)) return flat;
+    auto leveled = code_levels(work, work.captured.mesh, work.surface, false, steps, reason);
+    if (!leveled) return tl::unexpected(leveled.error());
+    return *leveled && price_of(work, (*leveled)->frame) < price_of(work, flat->frame) ? std::move(**leveled)
+                                                                                       : std::move(*flat);
 }
 
 // Not where frames are to have an error that is measured against the capture, noise and all.
