@@ -156,6 +156,7 @@ namespace Htvm
         public Allocator Allocator;
         public IntPtr RunTasks;
         public IntPtr RunTasksUser;
+        public uint DetailLevels;
     }
 
     [StructLayout(LayoutKind.Sequential)]

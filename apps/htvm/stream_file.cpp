@@ -260,6 +260,11 @@ void add_decoder_limits(CLI::App& command, DecoderOptions& limits) {
         ->transform(CLI::AsSizeValue(false))
         ->check(CLI::Range(std::uint64_t{1}, most_bytes, "from 1 to 2^60 bytes"))
         ->group(heading::limits);
+    command
+        .add_option("--level", limits.detail_levels,
+                    "Levels of detail that are shown below the mesh that frames refer to, where the stream has any: 0, "
+                    "none, takes least time (default: all)")
+        ->check(CLI::Range(0u, 9u));
     command.add_option("--max-vertices", limits.max_vertices, "Most vertices of a frame (default 4194304)")
         ->group(heading::limits);
     command.add_option("--max-triangles", limits.max_triangles, "Most triangles of a frame (default 8388608)")

@@ -180,6 +180,8 @@ typedef struct htvm_decoder_options {
     htvm_run_tasks run_tasks;  /* provides the threads. NULL, the default: a pool of the decoder's own, whose threads
                                 * stay */
     void* run_tasks_user;      /* for run_tasks */
+    uint32_t detail_levels;    /* how many levels of detail are shown below the mesh that frames refer to, where a
+                                * stream has any; with fewer, frames take less time. Default: 9, all */
 } htvm_decoder_options;
 
 /* Sets the first struct_size bytes of options to the defaults above. HTVM_BAD_INPUT if struct_size is less than 8. */
@@ -223,6 +225,10 @@ htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t 
  * callers with time to spare between two frames. It changes no frame, and the current one stays. It may be left out;
  * the next frame then takes longer. */
 htvm_status htvm_decoder_prepare(htvm_decoder* decoder);
+
+/* Sets htvm_decoder_options::detail_levels for the frames to come; the current one stays. The frames then have another
+ * topology. */
+htvm_status htvm_decoder_set_detail_levels(htvm_decoder* decoder, uint32_t levels);
 
 /* Discards what was sent and not received, e.g. for a seek. The sequence header and the last I-frame are kept. */
 htvm_status htvm_decoder_discard(htvm_decoder* decoder);

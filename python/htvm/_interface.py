@@ -73,6 +73,7 @@ class htvm_decoder_options(Structure):
         ("allocator", htvm_allocator),
         ("run_tasks", c_void_p),
         ("run_tasks_user", c_void_p),
+        ("detail_levels", c_uint32),
     ]
 
 

@@ -498,12 +498,15 @@ def open(
     max_triangles: Optional[int] = None,
     max_packet_bytes: Optional[int] = None,
     max_memory: Optional[int] = None,
+    detail_levels: Optional[int] = None,
 ) -> Stream:
     """Opens a stream: a path, bytes, or a binary file object such as a pipe or a socket's file.
 
     threads: that work at the same time; 0: one per core
     max_vertices, max_triangles, max_packet_bytes, max_memory: limits above which a frame is refused; None: the defaults
     of htvm.h, 2^22, 2^23, 2^28 and 2^32
+    detail_levels: how many levels of detail are shown below the mesh that frames refer to, where a stream has any; None:
+    all
 
     Raises CorruptStream if it is no htvm stream, and the errors of the operating system.
     """
@@ -514,6 +517,7 @@ def open(
     given = {
         "threads": threads, "max_vertices": max_vertices, "max_triangles": max_triangles,
         "max_packet_bytes": max_packet_bytes, "max_memory": max_memory,
+        "detail_levels": detail_levels,
     }
     for name, value in given.items():
         if value is None:

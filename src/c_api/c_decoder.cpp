@@ -55,6 +55,7 @@ htvm_decoder_options default_options() {
     out.max_bones = cpp.max_bones;
     out.max_packet_bytes = cpp.max_packet_bytes;
     out.max_memory = cpp.max_memory;
+    out.detail_levels = cpp.detail_levels;
     return out;
 }
 
@@ -68,6 +69,7 @@ htvm::DecoderOptions cpp_options(const htvm_decoder_options& options) {
     out.max_bones = options.max_bones;
     out.max_packet_bytes = options.max_packet_bytes;
     out.max_memory = options.max_memory;
+    out.detail_levels = options.detail_levels;
     return out;
 }
 
@@ -253,6 +255,12 @@ htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t 
 htvm_status htvm_decoder_prepare(htvm_decoder* decoder) {
     if (!decoder) return HTVM_BAD_INPUT;
     decoder->decoder.prepare();
+    return HTVM_OK;
+}
+
+htvm_status htvm_decoder_set_detail_levels(htvm_decoder* decoder, uint32_t levels) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    decoder->decoder.set_detail_levels(levels);
     return HTVM_OK;
 }
 

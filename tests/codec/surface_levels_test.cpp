@@ -192,7 +192,8 @@ TEST(SurfaceLevels, steps_shrink_towards_the_base_and_never_vanish) {
 TEST(SurfaceLevels, a_displaced_vertex_is_rounded_to_the_nearest_and_stays_on_the_lattice) {
     EXPECT_EQ(displaced_vertex({0.5, -0.5, 10.49}, {0, 0, 0}, 7), (LatticePoint{1, 0, 10}));
     EXPECT_EQ(displaced_vertex({0, 0, 0}, {0, -1, 0}, displacement_of(3, 8)), (LatticePoint{0, -1, 0}));
-    EXPECT_EQ(displaced_vertex({0, 0, 0}, {1, 0, 0}, displacement_of(most_displacement, 1 << 20)), (LatticePoint{lattice_limit, 0, 0}));
+    EXPECT_EQ(displaced_vertex({0, 0, 0}, {1, 0, 0}, displacement_of(most_displacement, 1 << 20)),
+              (LatticePoint{lattice_limit, 0, 0}));
 }
 
 // ---- The encoder ----------------------------------------------------------------------------------------------------

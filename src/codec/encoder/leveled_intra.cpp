@@ -50,6 +50,8 @@ Result<LeveledIntra> encode_leveled_intra(const LatticeMesh& captured, const Lev
     levels.levels.rounded = static_cast<std::uint32_t>(std::clamp(std::lround(32 * options.rounded), 0L, 255L));
     levels.levels.rules.fill(options.rule);
     levels.lambda = options.lambda;
+    levels.rounds = options.rounds;
+    levels.fit.choices = options.choices;
     levels.fit.least_moved = options.least_moved;
     levels.fit.threads = options.threads;
     out.settings = levels.levels;

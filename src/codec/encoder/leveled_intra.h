@@ -25,6 +25,8 @@ struct LeveledIntraOptions {
     int base_again = 1;         // see LeveledBaseOptions
     double lambda = 0.107;      // see SurfaceLevelsOptions
     double least_moved = 0.93;  // see SurfaceFitOptions
+    int rounds = 4;             // see SurfaceLevelsOptions
+    int choices = 3;            // see SurfaceFitOptions
     Threads threads = {};
 };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/parallel.h"
+
 namespace htvm::internal {
 namespace {
 
@@ -207,16 +209,28 @@ std::vector<Vector3d> SurfaceFit::moved_by(std::span<const double> change) const
 // How much half the squared distance shrinks with each displacement, where vertices have moved so far; residuals: false
 // for what the move alone makes of it.
 std::vector<double> SurfaceFit::gradient(std::span<const Vector3d> moved, bool residuals) const {
-    std::vector<Vector3d> pull(moved.size(), Vector3d{});
-    for (const auto& s : samples_) {
-        const Vector3d normal = to_vector(s.normal);
-        Vector3d there{};
-        for (std::size_t i = 0; i < 3; ++i) there = there + moved[s.corners[i]] * static_cast<double>(s.shares[i]);
-        const double residual = (residuals ? static_cast<double>(s.residual) : 0) - dot(there, normal);
-        const Vector3d force = normal * (residual * static_cast<double>(s.weight));
-        for (std::size_t i = 0; i < 3; ++i)
-            pull[s.corners[i]] = pull[s.corners[i]] + force * static_cast<double>(s.shares[i]);
-    }
+    // Parts of the samples are added up each for itself, always the same ones, so that sums do not depend on threads.
+    constexpr std::size_t parts = 4;
+    std::array<std::vector<Vector3d>, parts> pulls;
+    parallel_for(parts, options_.threads, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t part = begin; part < end; ++part) {
+            auto& own = pulls[part];
+            own.assign(moved.size(), Vector3d{});
+            for (std::size_t k = samples_.size() * part / parts; k < samples_.size() * (part + 1) / parts; ++k) {
+                const auto& s = samples_[k];
+                const Vector3d normal = to_vector(s.normal);
+                Vector3d there{};
+                for (std::size_t i = 0; i < 3; ++i)
+                    there = there + moved[s.corners[i]] * static_cast<double>(s.shares[i]);
+                const double residual = (residuals ? static_cast<double>(s.residual) : 0) - dot(there, normal);
+                const Vector3d force = normal * (residual * static_cast<double>(s.weight));
+                for (std::size_t i = 0; i < 3; ++i)
+                    own[s.corners[i]] = own[s.corners[i]] + force * static_cast<double>(s.shares[i]);
+            }
+        }
+    });
+    auto& pull = pulls[0];
+    for (std::size_t v = 0; v < pull.size(); ++v) pull[v] = (pull[v] + pulls[1][v]) + (pulls[2][v] + pulls[3][v]);
     for (const auto& s : samples_back_) {
         const double residual = (residuals ? s.residual : 0) - dot(moved[s.vertex], s.normal);
         pull[s.vertex] = pull[s.vertex] + s.normal * (residual * s.weight);

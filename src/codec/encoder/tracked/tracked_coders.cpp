@@ -153,6 +153,7 @@ Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const L
     StageClock clock(work.stages);
     LeveledIntraOptions options;
     options.step = LatticeUnits(tracking_numbers.levels_step * quantised.geometry);
+    if (!work.effort.thorough_levels) options.rounds = 3, options.choices = 2;
     options.threads = configuration.threads;
     auto leveled = encode_leveled_intra(source, options);
     if (!leveled) return tl::unexpected(leveled.error());
@@ -200,15 +201,14 @@ bool codes_levels(const TrackedWork& work) {
     const auto& options = configuration.options;
     const auto& mesh = work.captured.mesh;
     const auto wanted = options.tracked.levels;
-    if (wanted == ReferenceLevels::off || (wanted == ReferenceLevels::automatic && options.tracked.effort < 3))
-        return false;
-    return !options.intra_coder && (!configuration.tells_presence() || wanted == ReferenceLevels::on) && options.texture.layout == TextureLayout::none &&
-           options.tracked.simplify > 0 && mesh.texcoords.empty() && carries_surface(mesh) &&
-           !configuration.intra_only();
+    if (wanted == ReferenceLevels::off || (wanted == ReferenceLevels::automatic && !work.effort.levels)) return false;
+    return !options.intra_coder && (!configuration.tells_presence() || wanted == ReferenceLevels::on) &&
+           options.texture.layout == TextureLayout::none && options.tracked.simplify > 0 && mesh.texcoords.empty() &&
+           carries_surface(mesh) && !configuration.intra_only();
 }
 
-// What a coding of the same surface costs: bits where the error is equal, since a bit that is saved there brings so much
-// (docs/experiments/hierarchy.md).
+// What a coding of the same surface costs: bits where the error is equal, since a bit that is saved there brings so
+// much (docs/experiments/hierarchy.md).
 double price_of(const TrackedWork& work, const CodedFrame& frame) {
     constexpr double bits_by_error = 1.6;
     const auto errors = errors_between(work.captured.mesh, work.surface, detailed(frame.detail, frame.decoded),
@@ -220,8 +220,7 @@ Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameS
                                            FrameReason reason) {
     const bool simplify = work.configuration.options.tracked.simplify > 0 && carries_surface(work.captured.mesh);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
-    auto flat =
-        code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use, reason);
+    auto flat = code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use, reason);
     if (!flat || use != IntraUse::reference || !codes_levels(work)) return flat;
     auto leveled = code_levels(work, work.captured.mesh, work.surface, false, steps, reason);
     if (!leveled) return tl::unexpected(leveled.error());

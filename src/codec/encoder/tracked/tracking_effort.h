@@ -16,6 +16,8 @@ struct TrackingEffort {
     int surface_rounds = DeformationOptions{}.surface_rounds;
     int solver_iterations = DeformationOptions{}.solver_iterations;
     TargetSamples target_samples = TargetSamples::middles;  // see TargetSearch
+    bool levels = true;                // whether references are coded in levels unless it is said; and whether with
+    bool thorough_levels = false;      // all rounds of their fit, which take twice the time for 2 % of the bits
     bool always_other_starts = false;  // other starts are registered for every frame, not for lost ones alone
     int group = 1;                     // TrackedOptions::group where that is not given
     bool motion_alone = false;         // nothing but the motion of the nodes is coded, unless the picture falls apart

@@ -346,6 +346,12 @@ export class Decoder {
         this.#check(this.#module.call('htvm_decoder_prepare', this.#handle));
     }
 
+    /** How many levels of detail are shown of the frames to come, where a stream has any: fewer take less time. Frames then
+     *  have another topology. */
+    setDetailLevels(levels: number): void {
+        this.#check(this.#module.call('htvm_decoder_set_detail_levels', this.#handle, levels));
+    }
+
     /** Forgets what was sent and not received, as for a seek. */
     discard(): void {
         this.#check(this.#module.call('htvm_decoder_discard', this.#handle));

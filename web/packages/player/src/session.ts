@@ -4,6 +4,7 @@ import {
     DecoderError, packetKind, readAudio, type Decoder, type DecoderModule, type Frame, type Packet, type SequenceInfo,
 } from '@htvm/decoder';
 import { SourceError } from './byte_source.js';
+import { DetailChoice } from './detail_choice.js';
 import { FrameSender, type FrameContext } from './frame_sender.js';
 import type { Report, Request } from './messages.js';
 import { PictureSender } from './picture_sender.js';
@@ -150,6 +151,7 @@ export class PacketDecoder {
     readonly decoder: Decoder;
     #page: Page;
     #now: () => number;
+    #detail = new DetailChoice();
 
     /** now: milliseconds, of whatever beginning. */
     constructor(module: DecoderModule, page: Page, now = (): number => performance.now()) {
@@ -177,7 +179,9 @@ export class PacketDecoder {
         try {
             this.decoder.sendPacket(bytes);
             const frame = this.decoder.receive();
-            return { frame, error: null, decodeMs: this.#now() - begin };
+            const decodeMs = this.#now() - begin;
+            if (frame && kind === packetKind.tracked) this.#chooseDetail(decodeMs);
+            return { frame, error: null, decodeMs };
         } catch (error) {
             if (!(error instanceof DecoderError) || error.code === 'trap') throw error;
             if (kind === packetKind.sequence && error.code === 'unsupported')
@@ -185,6 +189,12 @@ export class PacketDecoder {
             if (error.code === 'limit') this.#page.notice(`A frame is beyond what the player takes: ${error.message}`);
             return { frame: null, error, decodeMs: this.#now() - begin };
         }
+    }
+
+    /** Fewer levels of detail where frames come late. */
+    #chooseDetail(decodeMs: number): void {
+        const intervalMs = 1000 / (this.sequence?.framesPerSecond ?? 30);
+        if (this.#detail.add(decodeMs, intervalMs)) this.decoder.setDetailLevels(this.#detail.levels);
     }
 
     /** Does a part of the next frame's work, once the last one was sent and nothing waits. */
