@@ -109,7 +109,8 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
             auto frame = decoder.decode_copy(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
             if (!*frame || numbers.of((*frame)->info.frame) != number) continue;
-            if (!(*frame)->presence.empty()) drop_loose_vertices((*frame)->mesh);
+            self.shown = {(*frame)->reference_topology, {}};
+            if (!(*frame)->presence.empty()) self.shown.places = drop_loose_vertices((*frame)->mesh);
             TexturedMesh out(std::move((*frame)->mesh));
             // Its picture comes behind it, before the next frame.
             const auto is_beside = [](PacketKind kind) {

@@ -20,6 +20,7 @@
 #include "io/mesh_file.h"
 #include "io/texture_file.h"
 #include "io/timestamps.h"
+#include "metrics/drift.h"
 
 namespace htvm::app {
 
@@ -37,6 +38,7 @@ struct MeshSource {
     bool guesses_unit = false;          // of files: from the first one that is read
     GlobalShift global_shift{};  // mm: off the capture's coordinates, of files what is taken off as they are read
     bool finds_shift = false;    // of files: from the first one that is read
+    ShownVertices shown;         // of a stream: of the mesh that was read last
     // The mesh in mm of the frame at this position of the sequence, with its texture if it has one, and then with the
     // texture's colours at its vertices too. Positions must ascend from call to call.
     std::function<Result<TexturedMesh>(MeshSource&, std::size_t position)> mesh_at;
