@@ -142,7 +142,7 @@ void add_script_options(CLI::App& command, EncodeRequest& request) {
 void add_conditions(CLI::App& command) {
     const auto option = [&](const char* name) { return command.get_option(name); };
     for (const char* of_rate : {"--buffer", "--passes"}) option(of_rate)->needs(option("--bitrate"));
-    option("--floor")->needs(option("--up"));
+    for (const char* of_axis : {"--floor", "--front"}) option(of_axis)->needs(option("--up"));
     // With a bitrate or a target error, quality follows from it, so options that set the steps directly contradict it.
     option("--bitrate")->excludes(option("--target-error"));
     for (const char* control : {"--bitrate", "--target-error"})

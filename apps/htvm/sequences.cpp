@@ -24,6 +24,7 @@
 #include "io/recording.h"
 #include "io/sequence.h"
 #include "io/texture_colours.h"
+#include "metrics/front.h"
 #include "stream_file.h"
 #include "stream_seek.h"
 #include "texture_output.h"
@@ -67,6 +68,7 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
     source.frames = source.numbers.size();
     if (!bounded || indexed != source.frames) source.bounds.reset();
     source.up = headers.sequence()->up;
+    source.front = front_of(headers.sequence()->metadata);
     source.rate = {headers.sequence()->fps_numerator, headers.sequence()->fps_denominator};
     source.millimetres_per_unit = headers.sequence()->unit_micrometres / 1000.0;
     source.global_shift = headers.sequence()->global_shift;

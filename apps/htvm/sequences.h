@@ -33,6 +33,7 @@ struct MeshSource {
     std::vector<FrameType> kinds;       // of the frames of a stream
     FrameRate rate;                     // of a stream
     UpAxis up = UpAxis::unknown;        // of a stream that says so
+    std::optional<Point3> front;        // likewise: the direction from the subject to who sees it from the front
     std::optional<SpaceBounds> bounds;  // mm, of all frames of a stream that says so
     double millimetres_per_unit = 1;    // the unit that files are in, or that a stream's capture was in
     bool guesses_unit = false;          // of files: from the first one that is read
