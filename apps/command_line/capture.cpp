@@ -15,6 +15,7 @@
 #include "io/skeleton_file.h"
 #include "io/skeleton_rate.h"
 #include "io/texture_colours.h"
+#include "metrics/front.h"
 #include "metrics/percentile.h"
 
 namespace htvm::app {
@@ -524,7 +525,7 @@ Result<void> Capture::read_first_again() {
                         length_text(step)));
     tell(textures_.findings().remarks, pipe_ ? name() : files_.paths[peeked_at_].string());
     has_texture_ = peeked_->texture != nullptr;
-    find_floor();
+    find_axes();
     // From files all is read again but what is kept.
     if (!pipe_) next_ = begin_;
     at_.reset();
@@ -541,13 +542,14 @@ void Capture::tell(const std::vector<MeshRemark>& remarks, const std::string& na
     }
 }
 
-// Finds which axis --up names, and where the first mesh ends on it.
-void Capture::find_floor() {
+// Finds which axis --up names, where the first mesh ends on it, and which way it faces around it.
+void Capture::find_axes() {
     up_ = options_.up;
     if (up_ == UpAxis::unknown) return;
     const auto axis = number_of(up_);
     if (const auto bounds = surface_bounds(peeked_->mesh))
         lowest_ = static_cast<double>(is_downwards(up_) ? bounds->high[axis] : bounds->low[axis]);
+    if (const auto facing = facing_of(peeked_->mesh)) first_azimuth_ = azimuth_of(*facing, up_).value_or(0);
 }
 
 // ---- Frames ---------------------------------------------------------------------------------------------------------

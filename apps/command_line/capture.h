@@ -136,6 +136,8 @@ public:
     UpAxis up() const { return up_; }
     // Where the first frame's lowest vertex lies along the axis that is up, mm; 0 if none is known to be.
     double lowest() const { return lowest_; }
+    // The azimuth around that axis from where the first frame is seen, if it is seen from one side only; else 0.
+    double first_azimuth() const { return first_azimuth_; }
     double millimetres_per_unit() const { return millimetres_per_unit_; }  // scaling included
     const GlobalShift& global_shift() const { return shift_; }             // mm, taken off the files' positions
 
@@ -152,7 +154,7 @@ private:
     Result<void> take_off_shift();
     void find_kind();
     Result<void> read_first_again();
-    void find_floor();
+    void find_axes();
     void tell(const std::vector<MeshRemark>& remarks, const std::string& name) const;
     void tell_of_size(const Mesh& mesh) const;
     void tell_of_texture() const;
@@ -210,7 +212,7 @@ private:
     };
     std::shared_ptr<Told> told_ = std::make_shared<Told>();  // copies tell nothing twice
     UpAxis up_ = UpAxis::unknown;
-    double lowest_ = 0;
+    double lowest_ = 0, first_azimuth_ = 0;
     Skeleton skeleton_;
     std::vector<Pose> poses_;
     std::vector<double> radii_;

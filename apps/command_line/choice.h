@@ -1,13 +1,33 @@
 // Options whose values are words: the parser turns a word into its value, and nothing behind it compares texts.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iterator>
 #include <string>
 #include <vector>
 
+#include "core/edit_distance.h"
+
 namespace htvm::app {
+
+// "cover is none of m1, m2, coverage; did you mean coverage?"
+inline std::string none_of(const std::string& word, const std::vector<std::string>& known) {
+    const auto meant = internal::meant_word(word, known);
+    return fmt::format("{} is none of {}{}", word.empty() ? "''" : word, fmt::join(known, ", "),
+                       meant.empty() ? "" : "; did you mean " + meant + "?");
+}
+
+// The check of an option whose values are words.
+inline CLI::Validator one_of(const std::vector<std::string>& words) {
+    return CLI::Validator(
+        [words](const std::string& word) {
+            return std::find(words.begin(), words.end(), word) == words.end() ? none_of(word, words) : std::string();
+        },
+        fmt::format("{{{}}}", fmt::join(words, ",")));
+}
 
 template <typename Value>
 struct Choice {
@@ -29,7 +49,7 @@ CLI::Option* add_choice(CLI::App& command, const std::string& flags, Target& tar
                     if (word == choice.word) target = choice.value;
             },
             meaning)
-        ->check(CLI::IsMember(words));
+        ->check(one_of(words));
 }
 
 // The word of a value; empty if it has none.

@@ -11,6 +11,7 @@
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -23,6 +24,8 @@
 #include "io/output_file.h"
 
 namespace htvm::app {
+
+using internal::meant_word;
 namespace {
 
 int exit_code(ErrorKind kind) {
@@ -39,16 +42,6 @@ int exit_code(ErrorKind kind) {
             return 6;
     }
     return 1;
-}
-
-// The known word most like this one, where it can have been meant; else empty.
-std::string meant_by(const std::string& word, const std::vector<std::string>& known) {
-    const auto distance = [&](const std::string& other) { return internal::edit_distance(word.substr(0, 100), other); };
-    const auto nearest = std::min_element(known.begin(), known.end(),
-                                          [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
-    const bool alike = nearest != known.end() && distance(*nearest) <= std::max<std::size_t>(word.size() / 3, 2) &&
-                       distance(*nearest) < word.size();
-    return alike ? *nearest : std::string();
 }
 
 std::vector<std::string> flags_of(const CLI::App& command) {
@@ -74,6 +67,44 @@ std::string odd_number(const CLI::Option& option, const std::string& text) {
     return text + " is out of range";
 }
 
+// The first of the words that the parser could not place which is meant as an option; empty: there is none.
+std::string unknown_flag(const CLI::App& command) {
+    for (const auto& word : command.remaining())
+        if (word.size() > 1 && word.starts_with('-')) return word.substr(0, word.find('='));
+    return "";
+}
+
+// Of flags, those that begin with this one and a hyphen: --fill-holes of --fill.
+std::vector<std::string> longer_than(const std::string& flag, const std::vector<std::string>& flags) {
+    std::vector<std::string> out;
+    for (const auto& other : flags)
+        if (other.starts_with(flag + "-")) out.push_back(other);
+    return out;
+}
+
+// Where an option is that the chosen command does not have: "it is one of 'htvm encode', beside --fill-holes"; empty:
+// nowhere.
+std::string option_elsewhere(const CLI::App& app, const std::string& flag) {
+    std::vector<std::string> commands;
+    std::string beside;
+    for (const auto* command : commands_of(app)) {
+        const auto flags = flags_of(*command);
+        if (std::find(flags.begin(), flags.end(), flag) == flags.end()) continue;
+        commands.push_back(fmt::format("'{} {}'", app.get_name(), command->get_name()));
+        if (const auto longer = longer_than(flag, flags); !longer.empty())
+            beside = fmt::format(", beside {}", fmt::join(longer, ", "));
+    }
+    if (commands.empty()) return "";
+    return fmt::format("it is one of {}{}", fmt::join(commands, ", "), commands.size() == 1 ? beside : "");
+}
+
+// What may have been meant instead of an option that is unknown here: a sentence and its end; or empty.
+std::string hint_at(const CLI::App& app, const CLI::App& command, const std::string& flag) {
+    if (const auto elsewhere = option_elsewhere(app, flag); !elsewhere.empty()) return elsewhere + "; ";
+    const auto meant = meant_word(flag, flags_of(command));
+    return meant.empty() ? "" : fmt::format("did you mean {}? ", meant);
+}
+
 // What the parser said, with the option's own words where it speaks of numbers.
 std::string in_words(const CLI::App& app, const CLI::Error& error) {
     const std::string said = error.what();
@@ -87,27 +118,28 @@ std::string in_words(const CLI::App& app, const CLI::Error& error) {
                 return fmt::format("{}: {}", name, odd_number(*option, given[0]));
         }
     }
+    for (const auto* command : app.get_subcommands())
+        if (const auto unknown = unknown_flag(*command); !unknown.empty())
+            return fmt::format("{} {} has no option {}", app.get_name(), command->get_name(), unknown);
     if (!app.get_subcommands().empty()) return said;
-    for (const auto& word : app.remaining())
-        if (word.starts_with('-')) return "there is no option " + word;
+    if (const auto unknown = unknown_flag(app); !unknown.empty()) return "there is no option " + unknown;
     return said == "A subcommand is required" ? "a command is required" : said;
 }
 
 // What was wrong with the command line, what may have been meant, and where to read on.
 std::string usage_message(const CLI::App* app, const CLI::Error& error) {
-    std::string command = app->get_name(), meant, help = "--help";
-    for (const auto& word : app->remaining())
-        if (meant.empty() && word.starts_with("--")) meant = meant_by(word, flags_of(*app));
+    std::string command = app->get_name(), help = "--help";
+    const CLI::App* chosen = app;
     for (const auto* named : app->get_subcommands()) {
         command += " " + named->get_name();
+        chosen = named;
         // The front page may lack the very option that was wrong.
         if (named->get_option_no_throw("--help-all")) help = "--help-all";
-        for (const auto& word : named->remaining())
-            if (meant.empty() && word.starts_with("--")) meant = meant_by(word, flags_of(*named));
     }
-    const std::string hint = meant.empty() ? "" : fmt::format("did you mean {}? ", meant);
-    return fmt::format("{}: error: {}; {}'{} {}' tells more\n", app->get_name(), in_words(*app, error), hint, command,
-                       help);
+    const auto unknown = unknown_flag(*chosen), said = in_words(*app, error);
+    const auto hint = unknown.starts_with("--") ? hint_at(*app, *chosen, unknown) : std::string();
+    return fmt::format("{}: error: {}{} {}'{} {}' tells more\n", app->get_name(), said, said.ends_with('?') ? "" : ";",
+                       hint, command, help);
 }
 
 // Output that is still buffered may fail to arrive: a full disk must not look like success.
@@ -129,6 +161,21 @@ void refuse_odd_numbers(const CLI::App& command) {
         }
 }
 
+// A switch takes no value: what stands behind it would be taken for a file. words: of the command line.
+void refuse_values_of_switches(const CLI::App& command, const std::vector<std::string>& words) {
+    static const std::set<std::string> values = {"on", "off", "auto", "yes", "no", "true", "false"};
+    for (std::size_t i = 0; i + 1 < words.size(); ++i) {
+        const auto* option = words[i].starts_with("--") ? command.get_option_no_throw(words[i]) : nullptr;
+        std::error_code error;
+        if (!option || option->get_items_expected_max() > 0 || !values.contains(words[i + 1]) ||
+            std::filesystem::exists(words[i + 1], error))
+            continue;
+        const auto longer = longer_than(words[i], flags_of(command));
+        throw CLI::ValidationError(words[i], fmt::format("takes no value, and '{}' is behind it{}", words[i + 1],
+                                                         longer.empty() ? "" : "; did you mean " + longer[0] + "?"));
+    }
+}
+
 std::vector<std::string> command_names(const CLI::App& app) {
     std::vector<std::string> out;
     for (const auto* command : commands_of(app)) out.push_back(command->get_name());
@@ -143,7 +190,7 @@ bool names_no_command(const CLI::App& app, const std::string& word) {
 
 void say_no_such_command(const Program& program, const CLI::App& app, const std::string& word) {
     const auto found = program.elsewhere.find(word);
-    const auto meant = meant_by(word, command_names(app));
+    const auto meant = meant_word(word, command_names(app));
     const auto flags = flags_of(app);
     const bool is_flag = std::find(flags.begin(), flags.end(), "--" + word) != flags.end();
     const std::string hint = found != program.elsewhere.end() ? fmt::format("it is '{}'", found->second)
@@ -219,10 +266,12 @@ int run_program(const Program& program, int argc, char** argv) {
     app.require_subcommand(1);
     Run run;
     for (const auto add : program.commands) add(app, run);
-    for (auto* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    const auto words = asked_words(argc, argv);
+    for (auto* command : app.get_subcommands([](const CLI::App*) { return true; })) {
         command->add_flag_callback("--quiet", quieten, "Say nothing but warnings and errors");
+        command->preparse_callback([command, &words](std::size_t) { refuse_values_of_switches(*command, words); });
+    }
     app.add_subcommand("help", fmt::format("Explain a command: {} help COMMAND", program.name));
-    auto words = asked_words(argc, argv);
     if (!words.empty() && names_no_command(app, words[0])) {
         say_no_such_command(program, app, words[0]);
         return 2;
@@ -232,8 +281,7 @@ int run_program(const Program& program, int argc, char** argv) {
         return written ? 0 : exit_with(program, written.error());
     }
     try {
-        std::reverse(words.begin(), words.end());  // as CLI11 wants them
-        app.parse(words);
+        app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // as CLI11 wants them
         for (const auto* command : app.get_subcommands()) refuse_odd_numbers(*command);
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? 0 : 2;

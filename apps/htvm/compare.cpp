@@ -141,8 +141,7 @@ void add_measurements(CLI::App& command, ComparisonRequest& o) {
                     "Measure only some of m1, m2, regions, coverage, texcoords, d1, d2, m3, flicker, topology,\n"
                     "separated by commas")
         ->delimiter(',')
-        ->check(
-            CLI::IsMember({"m1", "m2", "regions", "coverage", "texcoords", "d1", "d2", "m3", "flicker", "topology"}))
+        ->check(one_of({"m1", "m2", "regions", "coverage", "texcoords", "d1", "d2", "m3", "flicker", "topology"}))
         ->option_text("LIST");
     command
         .add_option("--covered-within", o.compare.coverage_options.within,

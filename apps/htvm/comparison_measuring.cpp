@@ -62,6 +62,22 @@ bool has_part_of_truth(const ComparisonRequest& options, const char* name) {
     return !options.truth.empty() && std::filesystem::is_directory(part_of_truth(options, name), error);
 }
 
+// A truth that there is, and that something can be measured by.
+Result<void> check_truth(const ComparisonRequest& options) {
+    if (options.truth.empty()) return {};
+    std::error_code error;
+    if (!std::filesystem::is_directory(options.truth, error))
+        return fail(ErrorKind::bad_input,
+                    fmt::format("--truth: there is no folder {}; 'htvm synth CAPTURE --truth {}' writes one beside a "
+                                "synthetic capture",
+                                options.truth, options.truth));
+    if (has_part_of_truth(options, "marks") || has_part_of_truth(options, "surface")) return {};
+    return fail(ErrorKind::bad_input,
+                fmt::format("--truth: {} is no truth: it must hold the folders marks, by which drift is measured, or "
+                            "surface, by which coverage is, as 'htvm synth CAPTURE --truth FOLDER' writes them",
+                            options.truth));
+}
+
 Result<TrueMeshes> open_truth(const ComparisonRequest& options, const char* name, const MeshSource& original) {
     auto source =
         open_meshes({part_of_truth(options, name).string()}, {LengthUnit::millimetre, "", options.limits, {}});
@@ -144,10 +160,10 @@ private:
 };
 
 Result<FrameDrift> measure_drift(TrueMeshes& marks, DriftMeter& meter, const MeshSource& original, std::size_t position,
-                                 const Mesh& decoded) {
+                                 const Mesh& decoded, const ShownVertices& shown) {
     const auto mesh = true_mesh(marks, original, position);
     if (!mesh) return tl::unexpected(mesh.error());
-    return meter.add(*mesh, decoded);
+    return meter.add(*mesh, decoded, shown);
 }
 
 }  // namespace
@@ -156,8 +172,8 @@ Result<Measured> measure(ComparisonRequest& options, Sources& sources, const std
     auto& [original, decoded] = sources;
     Measured out;
     std::optional<TrueMeshes> marks;
-    // A truth without marks says no drift.
-    if (has_part_of_truth(options, "marks") || (!options.truth.empty() && !has_part_of_truth(options, "surface"))) {
+    if (const auto ok = check_truth(options); !ok) return tl::unexpected(ok.error());
+    if (has_part_of_truth(options, "marks")) {
         auto opened = open_truth(options, "marks", original);
         if (!opened) return tl::unexpected(opened.error());
         marks = std::move(*opened);
@@ -187,7 +203,7 @@ Result<Measured> measure(ComparisonRequest& options, Sources& sources, const std
         out.places.push_back(pair.original);
         out.kinds.push_back(decoded.is_stream ? std::optional(decoded.kinds[pair.decoded]) : std::nullopt);
         if (marks) {
-            const auto drift = measure_drift(*marks, out.drift, original, pair.original, second->mesh);
+            const auto drift = measure_drift(*marks, out.drift, original, pair.original, second->mesh, decoded.shown);
             if (!drift) return tl::unexpected(drift.error());
             out.drifts.push_back(*drift);
         }
@@ -220,6 +236,9 @@ Result<Measured> measure(ComparisonRequest& options, Sources& sources, const std
     if (original.millimetres_per_unit != decoded.millimetres_per_unit)
         note(fmt::format("took the original's unit for {:g} mm and the decoded's for {:g} mm; --unit says otherwise",
                          original.millimetres_per_unit, decoded.millimetres_per_unit));
+    if (!options.truth.empty() && !marks && !options.compare.coverage)
+        note(fmt::format("{} has no folder marks, so drift is not measured; --only coverage measures by its surface",
+                         options.truth));
     if (out.frames.empty()) return fail(ErrorKind::bad_input, "There was no frame to compare.");
     return out;
 }

@@ -566,7 +566,7 @@ void add_places(CLI::App& command, Options& options) {
 
 void add_formats(CLI::App& command, Options& options) {
     command.add_option("--format", options.format, "Format in a folder: ply (default), obj or glb")
-        ->check(CLI::IsMember({"ply", "obj", "glb"}))
+        ->check(one_of({"ply", "obj", "glb"}))
         ->group(heading::output);
     add_choice(command, "--images", options.images, image_formats,
                "Format of the pictures of a texture, which go beside the meshes, or into a .glb: png (default) or\n"

@@ -19,6 +19,7 @@
 #include "htvm/running_time.hpp"
 #include "io/mesh_file.h"
 #include "line_rate.h"
+#include "metrics/front.h"
 #include "rate_passes.h"
 #include "rate_report.h"
 #include "stream_file.h"
@@ -222,6 +223,7 @@ Result<EncoderOptions> settings_for(const EncodePlan& plan, const Capture& captu
         out.floor = capture.lowest();
     else if (plan.floor.metres)
         out.floor = 1000 * *plan.floor.metres - shift_along(out.up, capture.global_shift());
+    if (plan.front) out.metadata.push_back(front_entry(direction_at(capture.first_azimuth() + *plan.front, out.up)));
     if (auto set = set_skeleton(plan, capture, out); !set) return tl::unexpected(set.error());
     if (auto set = set_texture(plan, capture, out); !set) return tl::unexpected(set.error());
     return out;

@@ -142,7 +142,7 @@ void add_script_options(CLI::App& command, EncodeRequest& request) {
 void add_conditions(CLI::App& command) {
     const auto option = [&](const char* name) { return command.get_option(name); };
     for (const char* of_rate : {"--buffer", "--passes"}) option(of_rate)->needs(option("--bitrate"));
-    option("--floor")->needs(option("--up"));
+    for (const char* of_axis : {"--floor", "--front"}) option(of_axis)->needs(option("--up"));
     // With a bitrate or a target error, quality follows from it, so options that set the steps directly contradict it.
     option("--bitrate")->excludes(option("--target-error"));
     for (const char* control : {"--bitrate", "--target-error"})
@@ -162,34 +162,37 @@ constexpr const char* examples =
     "  rig --ply | htvm encode - --bitrate 8 --drop-late -o wss://hub.example/publish/person";
 
 FrontPage front_page() {
-    return {{
-                {"input",
-                 "The meshes, one file per frame (PLY, OBJ, Draco, glTF): a folder, a pattern such as\n"
-                 "scan_%05d.ply, files in their order, or - for PLY after PLY on standard input"},
-                {"--output", "The stream: a file, - for standard output, or a hub, ws://HOST:PORT/publish/NAME"},
-                {"--quality",
-                 fmt::format("0 to 100 (default {}): more looks better, and takes more bits", default_quality)},
-                {"--bitrate", "Mbit/s to keep to; the quality follows"},
-                {"--target-error", "How far each frame's surface may be off, mm (RMS); the quality follows"},
-                {"--profile",
-                 "tracked (default): the fewest bits, on triangles that move along. topology: every\n"
-                 "frame's own triangles. paper: the same, as published"},
-                {"--effort", fmt::format("1 to 9 (default {}): more takes longer, and fewer bits",
-                                         EncoderOptions().tracked.effort)},
-                {"--threads", "Threads to use (default: one per core); the stream does not depend on it"},
-                {"--fps", "Frames per second of the meshes (default: as files or skeleton say, else 30)"},
-                {"--frames", "Use at most so many frames (default: all)"},
-                {"--skeleton", "The tracked skeleton, if there is one: JSON or BVH"},
-                {"--texture-as",
-                 "What becomes of a texture: colours at the vertices (default), or a picture, which\n"
-                 "is coded as video and keeps details; --help-all has the others"},
-                {"--audio", "Sound that begins with the first frame"},
-                {"--deadline", "Live: milliseconds that a frame may take; where time is short, less is searched"},
-            },
-            "Examples:\n"
-            "  htvm encode capture/ -o person.htvm\n"
-            "  htvm encode capture/ --bitrate 6 --audio voice.wav -o person.htvm\n"
-            "  rig --ply | htvm encode - --deadline 50 -o ws://localhost:8080/publish/person"};
+    return {
+        {
+            {"input",
+             "The meshes, one file per frame (PLY, OBJ, Draco, glTF): a folder, a pattern such as\n"
+             "scan_%05d.ply, files in their order, or - for PLY after PLY on standard input"},
+            {"--output", "The stream: a file, - for standard output, or a hub, ws://HOST:PORT/publish/NAME"},
+            {"--quality",
+             fmt::format("0 to 100 (default {}): more looks better, and takes more bits", default_quality)},
+            {"--bitrate", "Mbit/s to keep to; the quality follows"},
+            {"--target-error", "How far each frame's surface may be off, mm (RMS); the quality follows"},
+            {"--profile",
+             "tracked (default): the fewest bits, on triangles that move along. topology: every\n"
+             "frame's own triangles. paper: the same, as published"},
+            {"--effort",
+             fmt::format("1 to 9 (default {}): more takes longer, and fewer bits", EncoderOptions().tracked.effort)},
+            {"--threads", "Threads to use (default: one per core); the stream does not depend on it"},
+            {"--fps", "Frames per second of the meshes (default: as files or skeleton say, else 30)"},
+            {"--frames", "Use at most so many frames (default: all)"},
+            {"--skeleton", "The tracked skeleton, if there is one: JSON or BVH"},
+            {"--texture-as",
+             "What becomes of a texture: colours at the vertices (default), or a picture, which\n"
+             "is coded as video and keeps details; --help-all has the others"},
+            {"--audio", "Sound that begins with the first frame"},
+            {"--deadline", "Live: milliseconds that a frame may take; where time is short, less is searched"},
+        },
+        "Captures of depth cameras are known by their borders; --presence, --fill-holes and --specks in --help-all\n"
+        "change what becomes of them.\n"
+        "Examples:\n"
+        "  htvm encode capture/ -o person.htvm\n"
+        "  htvm encode capture/ --bitrate 6 --audio voice.wav -o person.htvm\n"
+        "  rig --ply | htvm encode - --deadline 50 -o ws://localhost:8080/publish/person"};
 }
 
 }  // namespace

@@ -271,6 +271,7 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     plan.pictures = request.pictures;
     plan.encoder = encoder_of(request, plan.output);
     plan.floor = *floor;
+    plan.front = request.encoding.front;
     plan.radii_file = request.encoding.radii_file;
     choose_passes(plan, request);
     plan.deadline = request.deadline;

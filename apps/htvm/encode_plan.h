@@ -83,7 +83,8 @@ struct EncodePlan {
 
     EncoderOptions encoder;  // all but what the capture says: its rate, unit, axes, skeleton, radii, texture
     Floor floor;
-    std::string radii_file;  // empty: none
+    std::optional<double> front;  // degrees around the axis that is up; none: not known
+    std::string radii_file;       // empty: none
 
     int fewest_passes = 1, most_passes = 1;  // over the capture, until the bitrate is met
 

@@ -167,6 +167,13 @@ void add_scene_options(CLI::App& command, EncodingOptions& options) {
                     "(default: not known)")
         ->type_name("NUMBER")
         ->group(heading::scene);
+    command
+        .add_option("--front", options.front,
+                    "From where the subject is seen from the front, degrees around the body: the --azimuth with which "
+                    "'htvm still capture/' looks at the face. Players begin there (default: where 0 looks)")
+        ->check(CLI::Range(-360.0, 360.0))
+        ->type_name("NUMBER")
+        ->group(heading::scene);
     const auto add_text = [&](const std::string& flag, const std::string& key, const std::string& help) {
         command
             .add_option_function<std::string>(
@@ -257,6 +264,8 @@ std::string options_in_markdown() {
         "| `skeleton` | `--skeleton` | the capture's joints and bones; none: one bone that spans the mesh is used |\n"
         "| `radii` | `--radii` | radii of the bones, from `calibrate()` or `htvm calibrate` |\n"
         "| `floor` | `--floor` | height of the floor: its coordinate on the `up` axis, mm |\n"
+        "| | `--front` | from where the subject is seen from the front, degrees around the body: the direction as the "
+        "entry `front` of the metadata |\n"
         "| `metadata` | `--title`, `--rights`, `--meta` | title, rights and other pairs of texts "
         "(`htvm_encoder_options_add_metadata` in C) |\n"
         "| `intra_coder` | `--intra` | a coder of I-frames other than TFAN |\n"

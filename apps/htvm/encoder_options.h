@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,7 @@ struct EncodingOptions {
     IntraCoder intra = IntraCoder::tfan;
     std::string radii_file;               // empty: none
     std::string floor;                    // metres, or "lowest": of the first frame's vertices; empty: not known
+    std::optional<double> front;          // degrees around the body, as an azimuth; none: not known
     std::vector<MetadataEntry> metadata;  // in the order given
     int passes = 0;                       // over the capture, for a bitrate; 0: as many as it needs
     bool draws_session = false;           // the session's number is a random one

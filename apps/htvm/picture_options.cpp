@@ -5,11 +5,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 
 #include "command_line/capture.h"
 #include "command_line/choice.h"
 #include "command_line/terminal.h"
+#include "metrics/front.h"
 #include "stream_file.h"
 
 namespace htvm::app {
@@ -74,6 +76,21 @@ void add_picture_options(CLI::App& command, PictureOptions& options) {
         .add_option("--field-of-view", options.views.field_of_view,
                     "Degrees from the upper to the lower edge: a small angle looks flat, a wide one near")
         ->capture_default_str();
+    command.add_option("--zoom", options.zoom, "How many times as large as where the whole is in the picture")
+        ->check(CLI::Range(0.01, 1000.0))
+        ->capture_default_str();
+    command
+        .add_option_function<std::vector<double>>(
+            "--look-at",
+            [&options](const std::vector<double>& place) {
+                for (const double c : place)
+                    if (!std::isfinite(c)) throw CLI::ValidationError("--look-at", "is three numbers, X,Y,Z");
+                options.look_at = {place[0], place[1], place[2]};
+            },
+            "What is in the middle of the picture, mm in the stream's coordinates (default: the middle of the box)")
+        ->delimiter(',')
+        ->expected(3)
+        ->type_name("X,Y,Z");
     add_shading_options(command, options.shading,
                         " (default: unlit, as captured, or smooth where there are no colours)");
     command
@@ -106,12 +123,23 @@ UpAxis likely_up(const Mesh& first) {
     return extent[2] > extent[1] ? UpAxis::plus_z : UpAxis::plus_y;
 }
 
-ViewOptions upright_views(const PictureOptions& options, const MeshSource& source, const Mesh& mesh) {
+ViewOptions subject_views(const PictureOptions& options, const MeshSource& source, const Mesh& first) {
     ViewOptions out = options.views;
     if (out.up == UpAxis::unknown) out.up = source.up;
-    if (out.up != UpAxis::unknown) return out;
-    out.up = likely_up(mesh);
-    if (out.up == UpAxis::plus_z) note("the first mesh is longer along z than along y: z is taken for up (see --up)");
+    if (out.up == UpAxis::unknown) {
+        out.up = likely_up(first);
+        if (out.up == UpAxis::plus_z)
+            note("the first mesh is longer along z than along y: z is taken for up (see --up)");
+    }
+    if (const auto front = source.front ? source.front : facing_of(first))
+        out.first_azimuth += azimuth_of(*front, out.up).value_or(0);
+    return out;
+}
+
+Camera closer(const Camera& camera, const Box& box, const PictureOptions& options) {
+    Camera out = camera;
+    out.scale *= options.zoom;
+    if (options.look_at) out.position = out.position + *options.look_at - (box.low + box.high) * 0.5;
     return out;
 }
 

@@ -33,6 +33,8 @@ void add_shading_options(CLI::App& command, ShadingOptions& options, const std::
 struct PictureOptions {
     std::vector<std::string> inputs;  // as open_meshes() takes them
     ViewOptions views;
+    double zoom = 1;                // times as large as where the whole is in the picture
+    std::optional<Point3> look_at;  // mm, what is in the picture's middle; none: the box's
     ShadingOptions shading;
     std::optional<Colour> background = Colour{255, 255, 255};  // none: transparent
     int samples = 3;                                           // across a pixel
@@ -42,7 +44,7 @@ struct PictureOptions {
 };
 // The positional argument: what is drawn.
 void add_picture_input(CLI::App& command, PictureOptions& options);
-// All of the above, --field-of-view, --background, --samples, --threads and the decoder's limits.
+// All of the above, --zoom, --look-at, --field-of-view, --background, --samples, --threads and the decoder's limits.
 void add_picture_options(CLI::App& command, PictureOptions& options);
 
 // How this mesh is drawn: coloured ones unlit unless told otherwise, as captured colours contain the light.
@@ -52,8 +54,13 @@ RenderOptions render_options(const PictureOptions& options, const TexturedMesh& 
 // y.
 UpAxis likely_up(const Mesh& first);
 
-// The views with an axis that is up: the option's, else the source's, else y or z, along which the mesh is longer.
-ViewOptions upright_views(const PictureOptions& options, const MeshSource& source, const Mesh& mesh);
+// The views with an axis that is up: the option's, else the source's, else y or z, along which the first mesh is
+// longer; and with azimuths from the front, as the source says it, or as the first mesh faces if it is seen from one
+// side only.
+ViewOptions subject_views(const PictureOptions& options, const MeshSource& source, const Mesh& first);
+
+// The camera with the zoom and the place to look at; box: the one that it looks at without.
+Camera closer(const Camera& camera, const Box& box, const PictureOptions& options);
 
 // As many samples as the options say, or as the largest canvas has room for.
 int samples_of(const PictureOptions& options);

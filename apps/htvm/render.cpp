@@ -159,7 +159,8 @@ Result<void> render_all(const Options& options, Frames& frames, const std::vecto
         const auto camera = orbit.at(k, shown.size());
         if (!camera) return tl::unexpected(camera.error());
         const auto drawable = make_drawable(**mesh, render_options(options.picture, **mesh));
-        const auto picture = draw_smoothly(drawable, *camera, samples_of(options.picture), canvas, pool.threads());
+        const auto picture = draw_smoothly(drawable, closer(*camera, orbit.box, options.picture),
+                                           samples_of(options.picture), canvas, pool.threads());
         if (auto ok = video->write(picture); !ok) return ok;
         progress.step();
     }
@@ -186,7 +187,7 @@ Result<void> render(Options options) {
     Frames frames(options);
     const auto first = frames.at(0);
     if (!first) return tl::unexpected(first.error());
-    Orbit orbit{*box, upright_views(options.picture, *source, (*first)->mesh), options.still_camera ? 0 : options.turns,
+    Orbit orbit{*box, subject_views(options.picture, *source, (*first)->mesh), options.still_camera ? 0 : options.turns,
                 1};
     const auto zoom = largest_zoom(frames, shown, orbit);
     if (!zoom) return tl::unexpected(zoom.error());

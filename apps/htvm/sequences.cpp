@@ -24,6 +24,7 @@
 #include "io/recording.h"
 #include "io/sequence.h"
 #include "io/texture_colours.h"
+#include "metrics/front.h"
 #include "stream_file.h"
 #include "stream_seek.h"
 #include "texture_output.h"
@@ -67,6 +68,7 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
     source.frames = source.numbers.size();
     if (!bounded || indexed != source.frames) source.bounds.reset();
     source.up = headers.sequence()->up;
+    source.front = front_of(headers.sequence()->metadata);
     source.rate = {headers.sequence()->fps_numerator, headers.sequence()->fps_denominator};
     source.millimetres_per_unit = headers.sequence()->unit_micrometres / 1000.0;
     source.global_shift = headers.sequence()->global_shift;
@@ -109,7 +111,8 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
             auto frame = decoder.decode_copy(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
             if (!*frame || numbers.of((*frame)->info.frame) != number) continue;
-            if (!(*frame)->presence.empty()) drop_loose_vertices((*frame)->mesh);
+            self.shown = {(*frame)->reference_topology, {}};
+            if (!(*frame)->presence.empty()) self.shown.places = drop_loose_vertices((*frame)->mesh);
             TexturedMesh out(std::move((*frame)->mesh));
             // Its picture comes behind it, before the next frame.
             const auto is_beside = [](PacketKind kind) {

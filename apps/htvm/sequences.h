@@ -20,6 +20,7 @@
 #include "io/mesh_file.h"
 #include "io/texture_file.h"
 #include "io/timestamps.h"
+#include "metrics/drift.h"
 
 namespace htvm::app {
 
@@ -32,11 +33,13 @@ struct MeshSource {
     std::vector<FrameType> kinds;       // of the frames of a stream
     FrameRate rate;                     // of a stream
     UpAxis up = UpAxis::unknown;        // of a stream that says so
+    std::optional<Point3> front;        // likewise: the direction from the subject to who sees it from the front
     std::optional<SpaceBounds> bounds;  // mm, of all frames of a stream that says so
     double millimetres_per_unit = 1;    // the unit that files are in, or that a stream's capture was in
     bool guesses_unit = false;          // of files: from the first one that is read
     GlobalShift global_shift{};  // mm: off the capture's coordinates, of files what is taken off as they are read
     bool finds_shift = false;    // of files: from the first one that is read
+    ShownVertices shown;         // of a stream: of the mesh that was read last
     // The mesh in mm of the frame at this position of the sequence, with its texture if it has one, and then with the
     // texture's colours at its vertices too. Positions must ascend from call to call.
     std::function<Result<TexturedMesh>(MeshSource&, std::size_t position)> mesh_at;

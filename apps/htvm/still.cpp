@@ -62,18 +62,19 @@ Result<void> still(const Options& options) {
     if (source->frames == 0) return fail(ErrorKind::bad_input, source->name + " has no frames");
     const auto position = position_of(options, *source);
     if (!position) return tl::unexpected(position.error());
-    // Which way is up, where nothing says it, is judged by the first frame, so that every frame's picture is alike.
+    // Which way is up, and where the front is, where nothing says it, is judged by the first frame, so that every
+    // frame's picture is alike.
     auto first = source->mesh_at(*source, 0);
     const auto textured = *position == 0 ? first : source->mesh_at(*source, *position);
     if (!textured) return tl::unexpected(textured.error());
     const Mesh* mesh = &textured->mesh;
     if (const auto ok = check_measurable(*mesh, source->name); !ok) return ok;
-    const auto cameras =
-        cameras_round(bounding_box(*mesh), upright_views(options.picture, *source, first ? first->mesh : *mesh));
+    const Box box = bounding_box(*mesh);
+    const auto cameras = cameras_round(box, subject_views(options.picture, *source, first ? first->mesh : *mesh));
     if (!cameras) return tl::unexpected(cameras.error());
     const internal::ThreadPool pool(options.picture.threads);
     Canvas canvas;
-    const auto camera = zoomed_to(*mesh, cameras->front(), options.picture.views.margin);
+    const auto camera = closer(zoomed_to(*mesh, cameras->front(), options.picture.views.margin), box, options.picture);
     const auto picture = draw_smoothly(make_drawable(*textured, render_options(options.picture, *textured)), camera,
                                        samples_of(options.picture), canvas, pool.threads());
     const auto png = png_of(picture, options.picture.background);
@@ -121,7 +122,8 @@ void add_still(CLI::App& app, Run& run) {
         "the still of NAME.htvm if it lies beside it.\n"
         "Examples:\n"
         "  htvm still person.htvm -o person.png\n"
-        "  htvm still capture/ --time 2.5 --azimuth 30 --background transparent -o poster.png");
+        "  htvm still capture/ --time 2.5 --azimuth 30 --background transparent -o poster.png\n"
+        "  htvm still person.htvm --zoom 4 --look-at 0,1600,80 -o face.png");
     command->callback([options, &run] {
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the picture; choose one");

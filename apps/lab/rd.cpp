@@ -66,9 +66,9 @@ Result<std::vector<CoderUnderTest>> chosen_coders(const Options& options) {
         const auto found =
             std::find_if(built_in.begin(), built_in.end(), [&](const CoderUnderTest& c) { return c.name == name; });
         if (found == built_in.end()) {
-            std::string known;
-            for (const auto& coder : built_in) known += (known.empty() ? "" : ", ") + coder.name;
-            return fail(ErrorKind::bad_input, fmt::format("there is no coder '{}'; there are {}", name, known));
+            std::vector<std::string> known;
+            for (const auto& coder : built_in) known.push_back(coder.name);
+            return fail(ErrorKind::bad_input, "--coders: " + none_of(name, known));
         }
         if (auto ok = add(*found); !ok) return tl::unexpected(ok.error());
     }
@@ -334,7 +334,7 @@ void add_sweep_options(CLI::App& command, Options& o) {
             "region of 10 cm, of I-frames and of the others: 99th percentile over frames), coverage (and errors\n"
             "over what is covered); default m1,m2, and coverage where the capture is open")
         ->delimiter(',')
-        ->check(CLI::IsMember({"m1", "m2", "m3", "d1", "regions", "coverage"}))
+        ->check(one_of({"m1", "m2", "m3", "d1", "regions", "coverage"}))
         ->option_text("LIST");
     command.add_option(
         "--samples", o.samples,

@@ -494,8 +494,9 @@ htvm_status htvm_encoder_options_get_number(htvm_encoder_options* options, const
 htvm_status htvm_encoder_options_set_skeleton(htvm_encoder_options* options, const htvm_skeleton* skeleton);
 
 /* Adds an entry to the metadata that every sequence header carries; both in UTF-8. Keys that players know: "title",
- * "rights", "timecode" (of the first frame, HH:MM:SS:FF). Limits, checked by htvm_encoder_create(): 255 entries, 255
- * bytes a key, 4095 a value, 16384 in all. */
+ * "rights", "timecode" (of the first frame, HH:MM:SS:FF), "front" (from the subject to whoever sees it from the front:
+ * three numbers, "0 0 -1"). Limits, checked by htvm_encoder_create(): 255 entries, 255 bytes a key, 4095 a value, 16384
+ * in all. */
 htvm_status htvm_encoder_options_add_metadata(htvm_encoder_options* options, const char* key, const char* value);
 
 /* Says where the floor is, mm: its coordinate on the axis that the option "up" names. */

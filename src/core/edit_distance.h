@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -23,6 +24,24 @@ inline std::size_t edit_distance(std::string_view a, std::string_view b) {
         }
     }
     return row.back();
+}
+
+// The known word that a mistyped one was to be: the one spelt most alike, where it is alike at all, else the first of
+// which the beginning was typed; empty where there is none. known: a range of texts.
+template <typename Words>
+std::string meant_word(std::string_view typed, const Words& known) {
+    const std::string_view word = typed.substr(0, 100);
+    const std::size_t most = word.size() < 2 ? 0 : word.size() < 4 ? 1 : std::max<std::size_t>(word.size() / 3, 2);
+    std::string_view nearest, begun;
+    std::size_t least = most + 1;
+    for (const std::string_view other : known) {
+        if (const auto distance = edit_distance(word, other); distance < least) {
+            least = distance;
+            nearest = other;
+        }
+        if (begun.empty() && word.size() > 1 && other.starts_with(word)) begun = other;
+    }
+    return std::string(nearest.empty() ? begun : nearest);
 }
 
 }  // namespace htvm::internal

@@ -16,7 +16,7 @@ void keep(const std::vector<std::uint32_t>& kept, std::vector<Value>& values) {
 
 }  // namespace
 
-void drop_loose_vertices(Mesh& mesh) {
+std::vector<std::uint32_t> drop_loose_vertices(Mesh& mesh) {
     std::vector<std::uint8_t> is_named(mesh.positions.size());
     for (const auto& triangle : mesh.triangles)
         for (const auto v : triangle) is_named[v] = 1;
@@ -31,6 +31,7 @@ void drop_loose_vertices(Mesh& mesh) {
     keep(kept, mesh.colours);
     keep(kept, mesh.normals);
     keep(kept, mesh.texcoords);
+    return kept;
 }
 
 }  // namespace htvm

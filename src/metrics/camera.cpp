@@ -3,33 +3,11 @@
 #include <numbers>
 #include <utility>
 
+#include "metrics/front.h"
 #include "metrics/render.h"
 
 namespace htvm {
 namespace {
-
-struct Axes {
-    Point3 right, up;
-};
-
-Axes axes_for(UpAxis up) {
-    switch (up) {
-        case UpAxis::plus_x:
-            return {{{0, 1, 0}}, {{1, 0, 0}}};
-        case UpAxis::minus_x:
-            return {{{0, 1, 0}}, {{-1, 0, 0}}};
-        case UpAxis::unknown:
-        case UpAxis::plus_y:
-            break;
-        case UpAxis::minus_y:
-            return {{{1, 0, 0}}, {{0, -1, 0}}};
-        case UpAxis::plus_z:
-            return {{{1, 0, 0}}, {{0, 0, 1}}};
-        case UpAxis::minus_z:
-            return {{{1, 0, 0}}, {{0, 0, -1}}};
-    }
-    return {{{1, 0, 0}}, {{0, 1, 0}}};
-}
 
 // The volume that the box sweeps as it turns about the vertical axis: a cylinder that encloses it.
 struct Cylinder {
@@ -71,8 +49,7 @@ Result<void> check(const ViewOptions& o) {
 Result<std::vector<Camera>> cameras_round(const Box& box, const ViewOptions& options) {
     if (const auto ok = check(options); !ok) return tl::unexpected(ok.error());
     const double degree = std::numbers::pi / 180;
-    const Axes axes = axes_for(options.up);
-    const Point3 front = cross(axes.right, axes.up);
+    const ViewAxes axes = view_axes(options.up);
     const Point3 centre = (box.low + box.high) * 0.5;
     const Extents extents = seen_from(enclosing_cylinder(box, axes.up), options.elevation * degree);
     const double free = 1 - 2 * options.margin;
@@ -97,7 +74,7 @@ Result<std::vector<Camera>> cameras_round(const Box& box, const ViewOptions& opt
     for (int i = 0; i < options.views; ++i) {
         const double azimuth = options.first_azimuth * degree + 2 * std::numbers::pi * i / options.views;
         const double elevation = options.elevation * degree;
-        const Point3 level = front * std::cos(azimuth) + axes.right * std::sin(azimuth);
+        const Point3 level = axes.front * std::cos(azimuth) + axes.right * std::sin(azimuth);
         camera.backward = normalised(level * std::cos(elevation) + axes.up * std::sin(elevation));
         camera.right = normalised(cross(axes.up, camera.backward));
         camera.up = cross(camera.backward, camera.right);

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <span>
+
+#include "core/equal_floats.h"
 
 namespace htvm {
 
@@ -88,17 +90,7 @@ double surface_area(std::span<const Vector3f> positions, std::span<const Triangl
 }
 
 std::vector<std::uint32_t> first_coincident_vertex(const Mesh& mesh) {
-    std::vector<std::uint32_t> order(mesh.positions.size());
-    std::iota(order.begin(), order.end(), 0u);
-    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-        return mesh.positions[a] != mesh.positions[b] ? mesh.positions[a] < mesh.positions[b] : a < b;
-    });
-    std::vector<std::uint32_t> first(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        const bool same = i > 0 && mesh.positions[order[i]] == mesh.positions[order[i - 1]];
-        first[order[i]] = same ? first[order[i - 1]] : order[i];
-    }
-    return first;
+    return internal::first_equal(std::span(mesh.positions));
 }
 
 std::vector<Vector3f> welded_normals(const Mesh& mesh) {

@@ -112,6 +112,15 @@ TEST(FrontPage, HasTwoOrThreeExamples) {
     EXPECT_LE(count, 3);
 }
 
+TEST(FrontPage, OfEncodeTellsWhereTheSwitchesForDepthCamerasAre) {
+    const auto page = help("encode"), all = help("encode", "--help-all");
+    EXPECT_THAT(page, HasSubstr("Captures of depth cameras are known by their borders"));
+    for (const char* flag : {"--presence", "--fill-holes", "--specks"}) {
+        EXPECT_THAT(page, HasSubstr(flag));
+        EXPECT_THAT(all, HasSubstr(flag));
+    }
+}
+
 TEST(HelpAll, HasWhatTheFrontPageHas) {
     for (const auto& command : long_commands) {
         const auto all = flags_of(help(command, "--help-all"));
@@ -184,7 +193,7 @@ TEST(CommandLine, AContradictionIsAUsageErrorThatNamesTheOption) {
     ends_with({"encode", "capture", "-o", "x.htvm", "--job", "1/2", "--session", "random"}, "--session: is random");
     ends_with({"encode", "capture", "-o", "x.htvm", "--job", "3/2"}, "--job: '3/2' is not I/N");
     ends_with({"encode", "capture", "-o", "x.htvm", "--profile", "best"},
-              "--profile: best not in {tracked,topology,paper}");
+              "--profile: best is none of tracked, topology, paper; 'htvm encode --help-all' tells more");
     ends_with({"encode", "capture", "-o", "x.htvm", "--bitrate", "4", "-q", "50"}, "--quality excludes --bitrate");
     ends_with({"encode", "capture", "-o", "x.htvm", "--passes", "2"}, "--passes requires --bitrate");
     ends_with({"publish", "-", "ws://localhost:1/publish/a", "--loop"}, "--loop: begins again, which standard input");
@@ -195,6 +204,50 @@ TEST(CommandLine, AContradictionIsAUsageErrorThatNamesTheOption) {
     ends_with({"decode", "a.htvm", "--audio", "voice.txt"}, "--audio: 'voice.txt' does not end in one of");
     ends_with({"synth", "--live", "folder"}, "OUT_DIR: or --live: give one of them");
     ends_with({"synth", "-"}, "OUT_DIR: is a folder; for meshes on standard output give --live");
+}
+
+std::string refusal_of(std::vector<std::string> words) {
+    const auto said = run(std::move(words));
+    EXPECT_EQ(said.code, 2);
+    return said.error;
+}
+
+TEST(CommandLine, SaysWhichCommandHasAnOptionThatThisOneLacks) {
+    EXPECT_EQ(refusal_of({"check", "capture", "--fill", "off"}),
+              "htvm: error: htvm check has no option --fill; it is one of 'htvm encode', beside --fill-holes; "
+              "'htvm check --help-all' tells more\n");
+    EXPECT_THAT(refusal_of({"decode", "a.htvm", "--presence=on"}),
+                HasSubstr("htvm decode has no option --presence; it is one of 'htvm encode'; 'htvm decode"));
+    EXPECT_THAT(refusal_of({"compare", "a", "b", "--fps", "30"}),
+                HasSubstr("htvm compare has no option --fps; it is one of 'htvm check', "));
+    EXPECT_THAT(refusal_of({"check", "capture", "--nowhere-known"}),
+                HasSubstr("htvm check has no option --nowhere-known; 'htvm check --help-all'"));
+}
+
+TEST(CommandLine, SaysWhichOptionOfTheSameCommandIsAlike) {
+    EXPECT_THAT(refusal_of({"check", "capture", "--frams", "3"}),
+                HasSubstr("htvm check has no option --frams; did you mean --frames? 'htvm check"));
+    EXPECT_THAT(refusal_of({"compare", "a", "b", "--cover", "3"}), HasSubstr("did you mean --covered-within? "));
+}
+
+TEST(CommandLine, TakesNoValueOfASwitchForAFile) {
+    EXPECT_EQ(refusal_of({"encode", "capture", "--fill", "off", "-o", "x.htvm"}),
+              "htvm: error: --fill: takes no value, and 'off' is behind it; did you mean --fill-holes? "
+              "'htvm encode --help-all' tells more\n");
+    EXPECT_THAT(refusal_of({"encode", "--drop-late", "on", "-o", "x.htvm"}),
+                HasSubstr("--drop-late: takes no value, and 'on' is behind it; 'htvm encode"));
+}
+
+TEST(CommandLine, OffersTheWordThatAMisspeltOneIsLike) {
+    EXPECT_THAT(refusal_of({"compare", "a", "b", "--only", "cover"}),
+                HasSubstr("--only: cover is none of m1, m2, regions, coverage, texcoords, d1, d2, m3, flicker, "
+                          "topology; did you mean coverage? 'htvm compare --help-all' tells more"));
+    EXPECT_THAT(refusal_of({"compare", "a", "b", "--only", "m1,flikker"}), HasSubstr("did you mean flicker?"));
+    EXPECT_THAT(refusal_of({"encode", "capture", "-o", "x.htvm", "--profile", "trackd"}),
+                HasSubstr("--profile: trackd is none of tracked, topology, paper; did you mean tracked?"));
+    EXPECT_THAT(refusal_of({"encode", "capture", "-o", "x.htvm", "--specks", "kep"}),
+                HasSubstr("--specks must be keep or auto, not 'kep'; did you mean keep?"));
+    EXPECT_THAT(refusal_of({"decode", "a.htvm", "-o", "x", "--format", "glbb"}), HasSubstr("did you mean glb?"));
 }
 
 }  // namespace

@@ -52,6 +52,45 @@ PYTHON
 [ "$(colours hard.png)" -eq 2 ] && [ "$(colours soft.png)" -gt 4 ] || fail "edges: $(colours hard.png) and $(colours soft.png) colours"
 "$htvm" still red.obj -o - "${small[@]}" --elevation 0 2>/dev/null | cmp -s - red.png || fail "standard output is another picture"
 
+# Nearer, and what is in the middle.
+"$htvm" still red.obj -o near.png "${small[@]}" --zoom 4 --elevation 0 --quiet
+shows near.png "60x40 200,10,0 200,10,0 200,10,0" 0,0 30,20 59,39
+"$htvm" still red.obj -o edge.png "${small[@]}" --look-at 500,0,0 --elevation 0 --quiet
+shows edge.png "60x40 200,10,0 255,255,255" 28,20 31,20
+"$htvm" still red.obj -o edge.png "${small[@]}" --look-at -500,0,0 --elevation 0 --quiet
+shows edge.png "60x40 255,255,255 200,10,0" 28,20 31,20
+expect 2 "--look-at" "$htvm" still red.obj -o x.png --look-at 1,2
+expect 2 "--zoom: 0 is not in 0.01 to 1000" "$htvm" still red.obj -o x.png --zoom 0
+"$htvm" render red.obj -o 'near/%05d.png' "${small[@]}" --still-camera --seconds 0.04 --zoom 4 --elevation 0 --quiet
+shows near/00000.png "60x40 200,10,0 200,10,0" 0,0 59,39
+
+# What is seen from one side only is shown from there: left is red for who looks along -z, and green from behind.
+two_halves() { # NAME: who looks along -z sees its front; NAME behind: its back
+    printf 'v %s 0 0 200 0 0\nv 0 0 0 200 0 0\nv 0 1 0 200 0 0\nv %s 1 0 200 0 0\n' -0.5 -0.5
+    printf 'v 0 0 0 0 200 0\nv 0.5 0 0 0 200 0\nv 0.5 1 0 0 200 0\nv 0 1 0 0 200 0\n'
+    if [ $# -gt 1 ]; then printf 'f 3 2 1\nf 4 3 1\nf 7 6 5\nf 8 7 5\n'; else printf 'f 1 2 3\nf 1 3 4\nf 5 6 7\nf 5 7 8\n'; fi
+}
+two_halves ahead >ahead.obj
+two_halves away behind >away.obj
+"$htvm" still ahead.obj -o ahead.png "${small[@]}" --quiet
+"$htvm" still away.obj -o away.png "${small[@]}" --quiet
+shows ahead.png "60x40 200,0,0 0,200,0" 20,20 40,20
+shows away.png "60x40 0,200,0 200,0,0" 20,20 40,20
+# A stream says where its front is, from where the capture's azimuth 0 looks.
+"$htvm" encode ahead.obj --profile topology --up y -o plain.htvm --quiet
+"$htvm" encode ahead.obj --profile topology --up y --front 180 -o turned.htvm --quiet
+"$htvm" encode away.obj --profile topology --up y --front 0 -o away.htvm --quiet
+expect 0 "front: 0 0 -1" "$htvm" info turned.htvm
+expect 0 "front: 0 0 -1" "$htvm" info away.htvm
+for azimuth in 0 30; do
+    "$htvm" still plain.htvm -o plain.png "${small[@]}" --azimuth $azimuth --quiet
+    "$htvm" still turned.htvm -o turned.png "${small[@]}" --azimuth $((azimuth + 180)) --quiet
+    cmp -s plain.png turned.png || fail "the front is not half a turn further at $azimuth"
+done
+"$htvm" still turned.htvm -o turned.png "${small[@]}" --quiet
+cmp -s ahead.png turned.png && fail "the front that a stream says changes nothing"
+expect 2 "--front requires --up" "$htvm" encode ahead.obj --front 180 -o x.htvm
+
 # Which frame: the middle one, by number, by time.
 mkdir squares
 square squares/s_17.obj "255 0 0"

@@ -21,7 +21,13 @@ expect 0 "drift along the surface, mm" "$htvm" compare dance dance.htvm --only m
 expect 0 "no frame has the same triangles as the one before" "$htvm" compare dance exact --only m2 --truth truth
 "$htvm" compare dance dance.htvm --only m2 --truth truth --csv - 2>/dev/null | head -1 |
     grep -q ',drift_age,drift_mean_mm,drift_p95_mm$' || fail "the CSV has no drift"
-expect 1 "nowhere" "$htvm" compare dance dance.htvm --truth nowhere
+expect 1 "--truth: there is no folder nowhere; 'htvm synth CAPTURE --truth nowhere' writes one" \
+    "$htvm" compare dance dance.htvm --truth nowhere
+expect 1 "--truth: dance is no truth: it must hold the folders marks, by which drift is measured, or surface" \
+    "$htvm" compare dance dance.htvm --truth dance
+mkdir unmarked && cp -r truth/surface unmarked
+expect 0 "unmarked has no folder marks, so drift is not measured; --only coverage measures by its surface" \
+    "$htvm" compare dance dance.htvm --only m2 --truth unmarked
 "$htvm" synth later --motion fast --frames 4 --first-frame 31 --vertices 1500 --truth later_truth --truth-marks 20 --quiet
 expect 1 "later_truth/marks has no frame 30; is it the truth of these originals?" \
     "$htvm" compare dance dance.htvm --only m2 --truth later_truth
@@ -37,6 +43,10 @@ cameras="--cameras 2 --motion calm --vertices 3000 --quiet"
 diff -r sheets again || fail "captures by the same depth cameras differ"
 "$htvm" synth last $cameras --first-frame 2 --frames 1
 cmp -s sheets/frame_00002.ply last/frame_00002.ply || fail "a frame of depth cameras on its own is another one"
+# Where surface comes and goes, drift is followed as long as the reference stays.
+"$htvm" encode sheets --presence on -o sheets.htvm --quiet
+"$htvm" compare sheets sheets.htvm --only m2 --truth sheets_truth --json --quiet | grep -q '"age": 2' ||
+    fail "drift begins anew where other vertices of a reference are there"
 [ "$(ls sheets_truth/seen | grep -c 'frame_0000[0-2].ply')" = 3 ] || fail "a frame of what cameras could see is missing"
 grep -q '"sensor": "kinect"' sheets_truth/truth.json || fail "truth.json does not name the cameras"
 [ ! -e truth/seen ] || fail "without cameras there is something that they see"

@@ -72,7 +72,7 @@ expect 1 "some/a_1.obj: there is no image for it, as there is for others" "$htvm
 expect 1 "bad          some/a_1.obj: there is no image for it" "$htvm" check some
 expect 1 "1 frame cannot be encoded: mend them" "$htvm" check some
 expect 1 "x.htvm is a stream, whose texture is inside" "$htvm" still x.htvm --texture skin.png -o x.png
-expect 2 "left not in {bottom,top}" "$htvm" still square.obj --texture-origin left -o x.png
+expect 2 "left is none of bottom, top" "$htvm" still square.obj --texture-origin left -o x.png
 rm skin.png
 expect 1 'square.obj: its image "skin.png" is not in its folder; --texture gives its place, or none to go on without' \
     "$htvm" encode square.obj -o x.htvm

@@ -33,7 +33,7 @@ for command in rd decoding reproduce events endure bake hierarchy; do expect 0 "
 # The sweep: tables, or only JSON on standard output; stored results are used again.
 expect 2 "--output is required" "$lab" rd capture
 expect 2 "is not a number" "$lab" rd capture -o rd -q nan
-expect 1 "there is no coder 'none-such'; there are paper" "$lab" rd capture -o rd --coders none-such
+expect 1 "--coders: none-such is none of paper" "$lab" rd capture -o rd --coders none-such
 expect 1 "nowhere" "$lab" rd nowhere -o rd
 expect 0 "rate against tfan-mpeg" "$lab" rd capture -o peers -q 20,40 --coders tfan,tfan-mpeg
 expect 0 "bpvf" "$lab" rd capture -o rd -q 40 --coders tfan,draco10

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "metrics/shapes.h"
 
@@ -67,6 +69,60 @@ TEST(Drift, OtherTrianglesAreANewReference) {
     EXPECT_EQ(slid->age, 1u);
     EXPECT_EQ(anew->age, 0u);
     EXPECT_NEAR(anew->mean_mm, 0.0, 1e-4);
+}
+
+// A mesh that shows the vertices of a plane for which `is_there`, as a decoded frame does, and where they are in it.
+template <typename Which>
+std::pair<Mesh, ShownVertices> part_of(const Mesh& plane, std::uint32_t reference, Which is_there) {
+    std::pair<Mesh, ShownVertices> out{{}, {reference, {}}};
+    std::vector<std::uint32_t> place_of(plane.positions.size(), 0);
+    for (std::uint32_t v = 0; v < plane.positions.size(); ++v) {
+        if (!is_there(plane.positions[v])) continue;
+        place_of[v] = static_cast<std::uint32_t>(out.second.places.size());
+        out.second.places.push_back(v);
+        out.first.positions.push_back(plane.positions[v]);
+    }
+    for (const auto& t : plane.triangles)
+        if (is_there(plane.positions[t[0]]) && is_there(plane.positions[t[1]]) && is_there(plane.positions[t[2]]))
+            out.first.triangles.push_back({place_of[t[0]], place_of[t[1]], place_of[t[2]]});
+    return out;
+}
+
+TEST(Drift, WhatIsThereOfAReferenceIsFollowedThroughTheReferencesVertices) {
+    const Mesh plane = shapes::plane(100, 10, 0), marks = marks_on_plane();
+    DriftMeter meter;
+    // From one side another row goes in every frame; the marks are from x = 30.3 to 66.3 mm.
+    for (std::uint32_t age = 0; age < 4; ++age) {
+        auto [mesh, shown] =
+            part_of(plane, 7, [&](const Vector3f& p) { return p[0] >= 10 * static_cast<float>(age + 1); });
+        const auto drift = meter.add(marks, shapes::moved(mesh, 3 * static_cast<float>(age), 0, 0), shown);
+        ASSERT_TRUE(drift.has_value()) << drift.error().message;
+        EXPECT_EQ(drift->age, age);
+        EXPECT_EQ(drift->marks, age < 3 ? 100u : 70u);  // 30.3, 34.3 and 38.3 mm are left of the last row
+        EXPECT_NEAR(drift->mean_mm, 3.0 * age, 1e-4);
+    }
+}
+
+TEST(Drift, APartOfAnotherReferenceIsANewReference) {
+    const Mesh plane = shapes::plane(100, 10, 0), marks = marks_on_plane();
+    const auto [mesh, shown] = part_of(plane, 7, [](const Vector3f& p) { return p[0] >= 10; });
+    DriftMeter meter;
+    ASSERT_TRUE(meter.add(marks, mesh, shown).has_value());
+    EXPECT_EQ(meter.add(marks, mesh, shown)->age, 1u);
+    EXPECT_EQ(meter.add(marks, mesh, {8, shown.places})->age, 0u);
+}
+
+TEST(Drift, AReferenceWithTheTrianglesOfTheOneBeforeGoesOn) {
+    const Mesh plane = shapes::plane(100, 10, 0), marks = marks_on_plane();
+    DriftMeter meter;
+    ASSERT_TRUE(meter.add(marks, plane, {7, {}}).has_value());
+    EXPECT_EQ(meter.add(marks, plane, {8, {}})->age, 1u);
+}
+
+TEST(Drift, VerticesShownWithoutAPlaceEachAreRefused) {
+    const Mesh plane = shapes::plane(100, 10, 0);
+    DriftMeter meter;
+    EXPECT_EQ(meter.add(marks_on_plane(), plane, {7, {0, 1}}).error().kind, ErrorKind::bad_input);
 }
 
 TEST(Drift, HiddenMarksAreNeitherFollowedNorMeasured) {

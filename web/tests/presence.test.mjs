@@ -16,7 +16,7 @@ async function source(path) {
 const { FrameSender } = await source('player/src/frame_sender.ts');
 const { FrameQueue } = await source('player/src/frame_queue.ts');
 const { HtvmMesh } = await source('three/src/htvm_mesh.ts');
-const { facingOf } = await source('player/src/facing.ts');
+const { facingOf, frontOf } = await source('player/src/facing.ts');
 
 /** Four vertices, of which `presence` says what is there; the last is far away. */
 function frame(topology, presence, referenceTopology = 1) {
@@ -91,4 +91,12 @@ test('what is seen from one side faces there, and a closed surface nowhere', () 
     assert.deepEqual(facingOf(corners, [0, 2, 1]), [0, 0, -1]);
     assert.equal(facingOf(corners, [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]), null);
     assert.equal(facingOf(corners, []), null);
+});
+
+test('the front is three numbers of the metadata, and nothing else', () => {
+    assert.deepEqual(frontOf({ front: '0 0 -2' }), [0, 0, -1]);
+    assert.deepEqual(frontOf({ title: 'A walk', front: ' 0.6 0 0.8 ' }), [0.6, 0, 0.8]);
+    for (const front of ['', '0 0', '0 0 0', '1 2 3 4', 'a b c', 'Infinity 0 0', '1,0,0'])
+        assert.equal(frontOf({ front }), null, front);
+    assert.equal(frontOf({}), null);
 });

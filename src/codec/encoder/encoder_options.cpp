@@ -565,7 +565,12 @@ Result<double> parse_value(const Option& option, std::string_view text) {
     }
     if (option.kind == OptionKind::word) {
         const auto word = std::find(option.words.begin(), option.words.end(), text);
-        if (word == option.words.end()) return refused();
+        if (word == option.words.end()) {
+            auto out = refused();
+            if (const auto meant = internal::meant_word(text, option.words); !meant.empty())
+                out.value().message += "; did you mean " + meant + "?";
+            return out;
+        }
         return static_cast<double>(word - option.words.begin());
     }
     double value = 0;

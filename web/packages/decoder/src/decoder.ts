@@ -44,6 +44,8 @@ export interface SequenceInfo {
     up: Axis | null;
     /** The floor's coordinate on that axis, millimetres; null if the stream does not say. */
     floor: number | null;
+    /** Texts by their keys: title, rights, front and others, if the stream has them. */
+    metadata: Record<string, string>;
     /** Version of the stream. */
     streamVersion: number;
 }
@@ -272,6 +274,9 @@ function number(view: DataView, at: number, type: string): number {
     }
 }
 
+// Of metadata, at most.
+const mostKeyBytes = 255, mostValueBytes = 4095;
+
 /** Takes packets or bytes, gives frames. Errors cost the packet that they are about: go on receiving. */
 export class Decoder {
     #module: DecoderModule;
@@ -373,6 +378,7 @@ export class Decoder {
             latticeStep: info.lattice_step,
             up: axes[info.up] ?? null,
             floor: info.floor_known ? info.floor : null,
+            metadata: this.#metadata(info.metadata),
             streamVersion: info.stream_version,
         };
     }
@@ -383,6 +389,22 @@ export class Decoder {
             this.#module.call('htvm_decoder_layer_bytes', this.#handle, this.#scratch, constants.HTVM_LAYERS));
         const view = this.#module.view();
         return Array.from({ length: constants.HTVM_LAYERS }, (_, i) => Number(view.getBigUint64(this.#scratch + 8 * i, true)));
+    }
+
+    // Of keys that are there twice, the first.
+    #metadata(entries: number): Record<string, string> {
+        const out: Record<string, string> = Object.create(null);
+        if (entries === 0) return out;
+        const key = this.#module.malloc(mostKeyBytes + 1 + mostValueBytes + 1);
+        const value = key + mostKeyBytes + 1;
+        for (let entry = 0; entry < entries; ++entry) {
+            this.#check(
+                this.#module.call(
+                    'htvm_decoder_metadata', this.#handle, entry, key, mostKeyBytes + 1, value, mostValueBytes + 1));
+            out[this.#module.text(key)] ??= this.#module.text(value);
+        }
+        this.#module.free(key);
+        return out;
     }
 
     #frame(): Frame {

@@ -2,6 +2,7 @@
 import type { Axis } from '@htvm/decoder';
 import { make } from './controls.js';
 import type { PlayerView } from './details.js';
+import type { Direction } from './facing.js';
 import { digestOf } from './frame_digest.js';
 import type { FrameReport } from './messages.js';
 import { Orbit } from './orbit.js';
@@ -18,8 +19,11 @@ export interface Look {
     follows: boolean;
     /** Share of the picture's height that controls cover at the bottom. */
     below: number;
-    /** The stream's up axis, and the floor's coordinate on it: millimetres, or null where nobody knows. */
-    up: { axis: Axis; floor: number | null };
+    /**
+     * The stream's up axis, the floor's coordinate on it, millimetres, and the direction from which the subject is seen from
+     * the front; null where nobody knows.
+     */
+    up: { axis: Axis; floor: number | null; front: Direction | null };
 }
 
 /** Degrees to the right and up, metres; undefined: as far away as shows the whole. */
@@ -45,7 +49,7 @@ export class Display {
     #listener: DisplayListener;
     #scene: StageScene | null = null;
     #orbit: Orbit | null = null;
-    #look: Look = { lit: false, dark: false, floorVisible: true, follows: true, below: 0, up: { axis: 'y', floor: null } };
+    #look: Look = { lit: false, dark: false, floorVisible: true, follows: true, below: 0, up: { axis: 'y', floor: null, front: null } };
     #shows = false; // a frame of this stream
     #texcoords: Float32Array | null = null; // of the reference that is shown
     #reference = -1; // its topology
@@ -191,5 +195,5 @@ function apply({ lit, dark, floorVisible, follows, below, up }: Partial<Look>, s
     if (floorVisible !== undefined) scene.floorVisible = floorVisible;
     if (follows !== undefined) scene.follows = follows;
     if (below !== undefined) scene.below = below;
-    if (up !== undefined) scene.setUp(up.axis, up.floor);
+    if (up !== undefined) scene.setUp(up.axis, up.floor, up.front);
 }

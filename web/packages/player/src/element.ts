@@ -5,6 +5,7 @@ import { actOnKey, Controls, type ControlActions } from './controls.js';
 import type { FramePresentedDetail, PlayerErrorDetail, PlayerStatistics, PlayerView } from './details.js';
 import { Display } from './display.js';
 import { DrawingLoop } from './drawing_loop.js';
+import { frontOf } from './facing.js';
 import { StampBook, type FrameStamps } from './frame_stamps.js';
 import { FullScreen } from './full_screen.js';
 import type { FrameReport } from './messages.js';
@@ -355,9 +356,9 @@ export class HtvmPlayerElement extends HTMLElement {
     // The attribute says it, else the stream, else it is y.
     #setUp(): void {
         const given = this.getAttribute('up') ?? '';
-        const { up = null, floor = null } = this.#sequence ?? {};
+        const { up = null, floor = null, metadata = {} } = this.#sequence ?? {};
         const axis = axes.includes(given) ? (given as Axis) : (up ?? 'y');
-        this.#display.look({ up: { axis, floor: axis === up ? floor : null } });
+        this.#display.look({ up: { axis, floor: axis === up ? floor : null, front: frontOf(metadata) } });
     }
 
     #setFirstView(): void {

@@ -7,7 +7,7 @@ import {
 } from 'three';
 import type { Material } from 'three';
 import type { Axis } from '@htvm/decoder';
-import { facingOf } from './facing.js';
+import { type Direction, facingOf } from './facing.js';
 import type { FrameReport } from './messages.js';
 import type { DecodedPicture } from './pictures.js';
 
@@ -59,7 +59,8 @@ export class StageScene {
     #bounds: Box3 | null = null; // of the first frame, upright, metres, not yet moved onto the floor
     #floor: number | null = null; // height of the floor in the upright mesh, metres
     #home: { distance: number; target: Vector3 } | null = null;
-    #facing = 0; // radians, from where the first frame's surface is seen, if it faces one way
+    #front: Direction | null = null; // from where the subject is seen from the front, as the stream says it
+    #facing = 0; // radians, from there, or from where the first frame's surface is seen, if it faces one way
     #followed = new Vector3(); // how far the view has gone with the mesh, along the floor
     #leash = 0; // metres
     #shadowIsOld = true;
@@ -87,8 +88,12 @@ export class StageScene {
         this.renderer.dispose();
     }
 
-    /** floor: its coordinate on the axis of the stream that `axis` names, millimetres; null: below the first frame. */
-    setUp(axis: Axis, floor: number | null = null): void {
+    /**
+     * floor: its coordinate on the axis of the stream that `axis` names, millimetres; null: below the first frame. front: the
+     * direction in the stream from which the subject is seen from the front; null: as the first frame faces.
+     */
+    setUp(axis: Axis, floor: number | null = null, front: Direction | null = null): void {
+        this.#front = front;
         this.#floor = floor === null ? null : ((axis.startsWith('-') ? -1 : 1) * floor) / 1000;
         const up = new Vector3(...axes[axis]);
         this.#upright.quaternion.copy(new Quaternion().setFromUnitVectors(up, new Vector3(0, 1, 0)));
@@ -218,7 +223,8 @@ export class StageScene {
     }
 
     #findFacing({ positions, indices }: FrameReport): void {
-        const facing = indices && facingOf(positions, indices);
+        this.#facing = 0;
+        const facing = this.#front ?? (indices && facingOf(positions, indices));
         if (!facing) return;
         const { x, z } = new Vector3(...facing).applyQuaternion(this.#upright.quaternion);
         if (Math.hypot(x, z) > 0.1) this.#facing = Math.atan2(x, z);
