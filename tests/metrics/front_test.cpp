@@ -1,5 +1,5 @@
 // From where a subject is seen from the front.
-#include "metrics/front.h"
+#include "core/front.h"
 
 #include <gtest/gtest.h>
 
@@ -56,8 +56,9 @@ TEST(Front, AClosedSurfaceFacesNoWayAndASheetFacesOne) {
     EXPECT_NEAR((*facing)[2], 1, 1e-9);
     for (auto& t : sheet.triangles) std::swap(t[1], t[2]);
     EXPECT_NEAR((*facing_of(sheet))[2], -1, 1e-9);
-    const Mesh tetrahedron = {.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
-                              .triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+    Mesh tetrahedron;
+    tetrahedron.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    tetrahedron.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
     EXPECT_EQ(facing_of(tetrahedron), std::nullopt);
     EXPECT_EQ(facing_of(Mesh{}), std::nullopt);
 }

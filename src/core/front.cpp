@@ -1,4 +1,4 @@
-#include "metrics/front.h"
+#include "core/front.h"
 
 #include <charconv>
 #include <cmath>
