@@ -307,16 +307,19 @@ TEST(OptionList, EveryOptionChangesTheBytesButThreads) {
     for (auto& p : sequence.frames.back().mesh.positions) p[0] += 2000;
     const auto lost_in_part = horned_ball(3);
     const auto in_sight = coming_and_going();
+    auto of_many_vertices = walking(1, 8000);  // where levels pay
+    of_many_vertices.frames[0].mesh.texcoords.clear();
     for (const auto& option : option_list()) {
         bool changes = false;
         for (auto settings : settings_for(option)) {
             const bool patches = std::string(option.name) == "tracked.patch_share";
             const bool seen =
                 std::string(option.name) == "tracked.fill" || std::string(option.name) == "tracked.specks";
-            const auto& tried_on = patches                                 ? lost_in_part
-                                   : seen                                  ? in_sight
-                                   : std::string(option.name) == "normals" ? with_normals
-                                                                           : sequence;
+            const auto& tried_on = patches                                        ? lost_in_part
+                                   : std::string(option.name) == "tracked.levels" ? of_many_vertices
+                                   : seen                                         ? in_sight
+                                   : std::string(option.name) == "normals"        ? with_normals
+                                                                                  : sequence;
             if (patches || seen) settings.subject_size = patched_options().subject_size;
             const auto before = bytes_by(tried_on, settings);
             ASSERT_TRUE(before.has_value());

@@ -71,7 +71,8 @@ TEST(SubjectSize, WhatIsLostIsPatchedForAnySize) {
 TEST(SubjectSize, ABitrateBuysTheSameErrorInProportion) {
     auto options = options_at_2_mm(Profile::tracked);
     options.rate.bits_per_second = 600'000;
-    expect_the_same_for_any_size(arms_down(8), options, 0.05);
+    // Which steps the rate leads to decides whether the reference has levels.
+    expect_the_same_for_any_size(arms_down(8), options, 0.12);
 }
 
 }  // namespace

@@ -63,6 +63,7 @@ TEST(TrackedFrames, KeepTheConnectivityOfTheirIntraFrame) {
 TEST(TrackedFrames, HaveASimplifiedIntraFrameUnlessToldNotTo) {
     const auto sequence = walking(2, true, 6000);
     auto options = tracked();
+    options.tracked.levels = ReferenceLevels::off;
     const auto simplified = encode(sequence, options);
     options.tracked.simplify = 0;
     const auto whole = encode(sequence, options);
