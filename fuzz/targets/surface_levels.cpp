@@ -24,9 +24,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             "no more vertices than allowed");
     require(surface->positions.size() >= base.positions.size(), "the base's vertices are there");
     require(fuzz::all_on_lattice(surface->positions), "vertices are on the lattice");
-    require(fuzz::names_vertices(surface->triangles, surface->positions.size()), "corners exist");
+    require(fuzz::names_vertices(surface->finest(), surface->positions.size()), "corners exist");
+    require(surface->displacements.size() == surface->positions.size(), "each vertex has a displacement");
     const auto again = decode_surface_levels(payload, base, most_vertices);
-    require(again && again->positions == surface->positions && again->triangles == surface->triangles,
+    require(again && again->positions == surface->positions && again->finest() == surface->finest(),
             "the same payload gives the same surface");
     const auto header = read_levels_header(payload);
     require(header.has_value(), "what is decoded has a header");

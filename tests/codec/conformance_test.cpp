@@ -16,6 +16,7 @@
 
 #include "codec/enhanced_options.h"
 #include "codec/format/sequence.h"
+#include "codec/levels_by_chance.h"
 #include "codec/moving_sequences.h"
 #include "codec/patched_sequences.h"
 #include "codec/patches_by_chance.h"
@@ -367,8 +368,63 @@ void write_presence() {
     write_packets("presence", with_presence(encode(meshes, options).packets, 1500, motion, 7));
 }
 
+// I-frames with levels as the encoder writes them, and T- and TP-frames that are shown with detail.
+void write_levels() {
+    auto options = patched_options();
+    options.tracked.levels = ReferenceLevels::on;
+    const auto coded = encode(horned_ball(6), options);
+    ASSERT_TRUE(coded.errors.empty()) << coded.errors[0];
+    ASSERT_GE(frames_of(coded, FrameType::patched), 1u);
+    ASSERT_EQ(read_frame_payload(coded.packets[1].payload)->header.intra_coder, intra_coder_levels);
+    write_packets("levels", coded.packets);
+}
+
+// I-frames with any levels of any mesh, and behind each what may follow it: T-, TP- and P-frames and groups, of which
+// a part is there.
+void write_levels_by_chance() {
+    TestSequence meshes{"levels", {}, {}};
+    meshes.frames.push_back(synthetic(false, 1, 60).frames[0]);
+    meshes.frames.push_back(sequence_of(tfan_test::grid(5, 4), 1, none).frames[0]);
+    for (const auto& shape : tfan_test::special_meshes())
+        if (shape.name == "no vertex" || shape.name == "isolated vertices" || shape.name == "three at an edge")
+            meshes.frames.push_back(sequence_of(shape, 1, colours).frames[0]);
+    EncoderOptions encoder_options = test::enhanced_options();
+    encoder_options.key_interval = 1;
+    encoder_options.topology.merge_duplicates = false;
+    encoder_options.geometry_step = 6;
+    auto packets = encode(meshes, encoder_options).packets;
+    std::mt19937 random(5);
+    unsigned number = 0;
+    for (auto& packet : packets) {
+        if (packet.kind != PacketKind::intra) continue;
+        const auto plain = *read_frame_payload(packet.payload);
+        const auto base = *decode_intra_frame(plain, nullptr);
+        LeveledByChanceOptions options;
+        options.levels.depth = {1 + number % 3, 500};
+        options.levels.step = 128;
+        options.levels.rules.fill({number % 3, 8 - number % 2});
+        options.levels.rules[1] = {8, 0};
+        options.levels.rounded = number % 2 == 0 ? 40 : 0;
+        options.referred = number % 2;
+        options.colours = number != 1;
+        options.normals = number % 3 == 0;
+        auto coded = leveled_by_chance(base, options, random);
+        ++number;
+        ASSERT_TRUE(coded);
+        coded->payload.header.source_vertices = plain.header.source_vertices;
+        coded->payload.header.source_triangles = plain.header.source_triangles;
+        coded->payload.set(Layer::pose, {plain.of(Layer::pose).begin(), plain.of(Layer::pose).end()});
+        packet.payload = write_frame_payload(coded->payload);
+    }
+    ChanceMotion motion;
+    motion.fields.step = {64, 20, 20};
+    write_packets("levels_by_chance", with_presence(packets, 1500, motion, 7));
+}
+
 void write_all() {
     fs::create_directories(folder);
+    write_levels();
+    write_levels_by_chance();
     write_audio_between();
     write_corner_cases();
     write_choices();

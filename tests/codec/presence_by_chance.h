@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "codec/levels_by_chance.h"
 #include "codec/patches_by_chance.h"
 #include "codec/tracked/frame_group.h"
 #include "codec/tracked/presence.h"
@@ -43,8 +44,9 @@ public:
     void add_intra(const Packet& intra, Removal gone, bool told = true, bool settled = false) {
         model_ = intra;
         auto payload = copy_of(*read_frame_payload(intra.payload));
-        auto mesh = *decode_intra_frame(view_of(payload), nullptr);
-        smooth_as_shown(mesh, static_cast<std::int32_t>(payload.header.geometry_step), settled, out_.header);
+        auto mesh = coded_mesh(view_of(payload));
+        if (payload.header.intra_coder != intra_coder_levels)
+            smooth_as_shown(mesh, static_cast<std::int32_t>(payload.header.geometry_step), settled, out_.header);
         Presence presence;
         if (told) {
             presence = presence_by_chance(gone, mesh.positions, random_);

@@ -4,49 +4,25 @@
 
 #include <cmath>
 #include <random>
+#include <set>
 
 #include "codec/ball.h"
 #include "codec/encoder/leveled_intra.h"
 #include "codec/intra/intra_frame.h"
 #include "codec/intra/surface_levels_walk.h"
 #include "codec/intra_test_meshes.h"
-#include "entropy/range_coder.h"
+#include "codec/levels_by_chance.h"
 #include "surface/surface_index.h"
 
 namespace htvm::internal {
 namespace {
 
 using test::ball;
+using test::LevelsByChance;
 
-// A payload of these levels on a base, whose displacements are random ones.
-struct RandomPayload {
-    std::vector<std::uint8_t> bytes;
-    LeveledSurface surface;
-};
-RandomPayload random_payload(const LatticeMesh& base, const SurfaceLevels& levels, unsigned seed, std::int32_t most) {
+LevelsByChance random_payload(const LatticeMesh& base, const SurfaceLevels& levels, unsigned seed, std::int32_t most) {
     std::mt19937 random(seed);
-    std::vector<std::vector<std::uint8_t>> runs;
-    DisplacementModels models;
-    RandomPayload out;
-    std::vector<std::int32_t> values;
-    out.surface.triangles = base.triangles;
-    out.surface.subdivision = *subdivide(base, levels.depth, 1 << 20);
-    for (std::uint32_t k = 0; k <= levels.depth.levels; ++k) {
-        const auto* level = k > 0 ? &out.surface.subdivision[k - 1] : nullptr;
-        const auto expected =
-            level ? ExpectedLevel(*level, out.surface.positions, out.surface.triangles_above(k), levels.rules[k - 1])
-                  : ExpectedLevel(base);
-        RangeEncoder encoder;
-        WritingCoder<RangeEncoder> coder{encoder};
-        code_displacements(coder, models, level, k, expected, step_at(levels, k), out.surface, values,
-                           [&](std::size_t, const DisplacementContext&) {
-                               return random() % 3 == 0 ? static_cast<std::int32_t>(random() % (2u * most + 1)) - most
-                                                        : 0;
-                           });
-        runs.push_back(encoder.finish());
-    }
-    out.bytes = write_surface_levels(levels, runs);
-    return out;
+    return *test::levels_by_chance(base, levels, most, 1 << 20, random);
 }
 
 SurfaceLevels some_levels(std::uint32_t levels, std::uint32_t longest) {
@@ -190,10 +166,74 @@ TEST(SurfaceLevels, steps_shrink_towards_the_base_and_never_vanish) {
 }
 
 TEST(SurfaceLevels, a_displaced_vertex_is_rounded_to_the_nearest_and_stays_on_the_lattice) {
-    EXPECT_EQ(displaced_vertex({0.5, -0.5, 10.49}, {0, 0, 0}, 7), (LatticePoint{1, 0, 10}));
+    EXPECT_EQ(displaced_vertex({0.5, -0.5, 10.49}, {0, 0, 0}, displacement_of(7, 16)), (LatticePoint{1, 0, 10}));
     EXPECT_EQ(displaced_vertex({0, 0, 0}, {0, -1, 0}, displacement_of(3, 8)), (LatticePoint{0, -1, 0}));
     EXPECT_EQ(displaced_vertex({0, 0, 0}, {1, 0, 0}, displacement_of(most_displacement, 1 << 20)),
               (LatticePoint{lattice_limit, 0, 0}));
+}
+
+// The ends of the edges of a surface that the tangent planes' rule moves off their middle by so much or more.
+std::set<std::array<std::uint32_t, 2>> bent(const LeveledSurface& surface, double least) {
+    const auto normals = vertex_normals(surface.positions, surface.finest());
+    const auto edges = find_edges(surface.positions.size(), surface.finest());
+    std::set<std::array<std::uint32_t, 2>> out;
+    for (const auto& ends : edges.ends) {
+        EdgeStencil stencil;
+        stencil.a = ends[0];
+        stencil.b = ends[1];
+        const auto off = tangents_offset(surface.positions, normals, stencil);
+        if (dot(off, off) >= least * least) out.insert(ends);
+    }
+    return out;
+}
+
+TEST(SurfaceLevels, the_level_that_rounds_off_splits_exactly_the_edges_that_are_bent_enough) {
+    const auto base = ball(2, [](const Vector3d& d) { return 1000 + 500 * d[1] * d[1]; });
+    std::size_t splits = 0, edges = 0;
+    for (const std::uint32_t rounded : {1u, 16u, 40u, 255u}) {
+        auto levels = some_levels(1, 400);
+        const auto coded = random_payload(base, levels, 3, 2);
+        levels.rounded = rounded;
+        const auto same = random_payload(base, levels, 3, 2);
+        const auto without = decode_surface_levels(coded.bytes, base, 1 << 20);
+        const auto with = decode_surface_levels(same.bytes, base, 1 << 20);
+        ASSERT_TRUE(without && with);
+        ASSERT_EQ(with->subdivision.size(), 2u);
+        const auto& level = with->subdivision.back();
+        std::set<std::array<std::uint32_t, 2>> split;
+        for (const auto& s : level.stencils) split.insert({s.a, s.b});
+        EXPECT_EQ(split, bent(*without, displacement_of(static_cast<std::int32_t>(rounded), levels.step) / 32));
+        splits += split.size();
+        edges += find_edges(without->positions.size(), without->finest()).size();
+        // It displaces nothing, and leaves what was there.
+        ASSERT_TRUE(std::equal(without->positions.begin(), without->positions.end(), with->positions.begin()));
+        for (std::size_t v = level.first; v < with->positions.size(); ++v) ASSERT_EQ(with->displacements[v], 0);
+        EXPECT_EQ(decode_surface_levels(same.bytes, base, 1 << 20, 1)->positions, without->positions)
+            << "it is not among the coded levels";
+    }
+    EXPECT_GT(splits, 0u);
+    EXPECT_LT(splits, edges);
+}
+
+TEST(SurfaceLevels, nothing_is_rounded_off_where_the_surface_is_flat) {
+    LatticeMesh sheet;
+    sheet.triangles = intra_test::grid(3).triangles;
+    for (int v = 0; v < 16; ++v) sheet.positions.push_back({v % 4 * 100, v / 4 * 100, 7});
+    auto levels = some_levels(0, 100);
+    levels.rounded = 1;
+    const auto decoded = decode_surface_levels(random_payload(sheet, levels, 1, 0).bytes, sheet, 1 << 20);
+    ASSERT_TRUE(decoded);
+    EXPECT_EQ(decoded->positions, sheet.positions);
+    EXPECT_EQ(decoded->finest(), sheet.triangles);
+}
+
+TEST(SurfaceLevels, sizes_of_runs_cannot_add_up_to_more_than_there_is_memory_for) {
+    const auto base = ball(0, [](const Vector3d&) { return 1000; });
+    std::vector<std::uint8_t> payload{8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};  // eight levels and their rules
+    for (int k = 0; k < 9; ++k) payload.insert(payload.end(), {0x80, 0x80, 0x80, 0x80, 0x04});  // 2^30 each
+    const auto decoded = decode_surface_levels(payload, base, 1 << 16);
+    ASSERT_FALSE(decoded);
+    EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream);
 }
 
 // ---- The encoder ----------------------------------------------------------------------------------------------------

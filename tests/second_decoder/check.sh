@@ -110,6 +110,9 @@ for group in 2 5 8; do
     same fast_normals "$work/fast_normals" --profile tracked --group $group -q 60
 done
 contains tracked
+# I-frames with levels, and the detail of what refers to them.
+same person "$person" --profile tracked --levels on -q 20
+same fast_normals "$work/fast_normals" --profile tracked --levels on -q 20
 # Presence: of a person what one depth camera sees.
 "$htvm" synth "$work/seen" --vertices 800 --frames 6 --motion calm --cameras 1 >/dev/null 2>&1
 for group in 1 3; do

@@ -18,6 +18,7 @@ from conventions import Corrupt, Unsupported, check
 from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
 from group import FrameGroup, read_group_payload
 from intra import decode_intra_mesh
+from levels import decode_leveled_mesh, detail_that_stays, with_detail
 from nodes import Kept, smoothed
 from reference import Reference, decode_pose
 from patched import decode_patched_mesh
@@ -59,16 +60,29 @@ def intra_presence(header, packet, frame, mesh):
     return decode_presence_layer(frame.layer(PRESENCE), vertices, mesh.triangles)
 
 
-class Group:
-    """An I- or TP-frame and what T-frames make of it (8.11). presence: None before version 7."""
+LEVELED = 2  # an intra coder
 
-    def __init__(self, mesh, frame, number, step=1, kept=Kept(), textured=None, presence=None):
+
+def intra_mesh(frame):
+    """An I-frame's mesh, the step of its positions, and its detail, or None."""
+    if frame.intra_coder == LEVELED:
+        mesh, detail = decode_leveled_mesh(frame)
+        return mesh, 1, detail
+    return decode_intra_mesh(frame), frame.geometry_step, None
+
+
+class Group:
+    """An I- or TP-frame and what T-frames make of it (8.11). presence: None before version 7. detail: of the mesh
+    (6.9), or None."""
+
+    def __init__(self, mesh, frame, number, step=1, kept=Kept(), textured=None, presence=None, detail=None):
         self.mesh, self.frame, self.number, self.step, self.kept = mesh, frame, number, step, kept
-        self.textured, self.presence = textured, presence
+        self.textured, self.presence, self.detail = textured, presence, detail
         self.reference = self.state = self.last = self.group = None
 
     def shown(self, mesh, presence):
         """A mesh of its vertices, as it is shown. presence: None before version 7."""
+        mesh, presence = with_detail(self.detail, mesh, presence)
         if self.textured:
             mesh = self.textured.show(mesh)
         return mesh if presence is None else shown(mesh, presence, self.textured.copied if self.textured else ())
@@ -126,7 +140,8 @@ class Group:
             before = [corners for triangle, corners in zip(self.mesh.triangles, self.textured.corners)
                       if stays.issuperset(triangle)]
             textured = textured_surface(header, frame, mesh, before)
-        group = Group(mesh, frame, packet.frame, kept=kept, textured=textured, presence=presence)
+        detail = detail_that_stays(self.detail, len(self.mesh.positions), stay, mesh)
+        group = Group(mesh, frame, packet.frame, kept=kept, textured=textured, presence=presence, detail=detail)
         return mesh, joints, group
 
 
@@ -160,14 +175,15 @@ def decode_stream(data):
                 check(header, "a frame came before any sequence header")
                 frame = read_coded_frame(packet)
                 joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
-                mesh, step = decode_intra_mesh(frame), frame.geometry_step
-                if header.version >= 4 and header.node_spacing > 0:
+                mesh, step, detail = intra_mesh(frame)
+                if frame.intra_coder != LEVELED and header.version >= 4 and header.node_spacing > 0:
                     if not packet.of_tracked_mesh():
                         mesh.positions = smoothed(mesh.positions, mesh.triangles, step, at_seams=bool(mesh.texcoords))
                     step = 1
                 textured = textured_surface(header, frame, mesh)
+                check(not detail or not textured, "it has detail and charts")
                 presence = intra_presence(header, packet, frame, mesh)
-                own = Group(mesh, frame, packet.frame, step, textured=textured, presence=presence)
+                own = Group(mesh, frame, packet.frame, step, textured=textured, presence=presence, detail=detail)
                 if packet.referred():
                     reference, books, group = Reference(mesh, joints, header, packet.frame), [None, None], own
                 yield packet, header, own.shown(mesh, presence)

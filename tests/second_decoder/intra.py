@@ -362,21 +362,30 @@ class Mesh:
         self.colours = self.normals = self.texcoords = None
 
 
+def decode_triangles_and_points(frame, vertices, triangles):
+    """Triangles, grid points, and the neighbourhood of a mesh of so many vertices and triangles."""
+    fans = FanDecoder(frame.layer(FANS), triangles, NumberInTurn(vertices), seed_implies_fan=True)
+    decoded = fans.decode()
+    around = Neighbourhood(vertices, decoded)
+    return decoded, decode_positions(frame.layer(GEOMETRY), around), around
+
+
+def on_lattice(points, step):
+    for p in points:
+        check(max(abs(x) for x in p) <= L // step, "a vertex is off the lattice")
+    return [tuple(x * step for x in p) for p in points]
+
+
 def decode_intra_mesh(frame):
     if frame.intra_coder != 0:
         raise Unsupported("the I-frame was coded by Draco" if frame.intra_coder == 1 else "an unknown intra coder")
     mesh = Mesh()
-    fans = FanDecoder(frame.layer(FANS), frame.triangles, NumberInTurn(frame.vertices), seed_implies_fan=True)
-    mesh.triangles = fans.decode()
-    around = Neighbourhood(frame.vertices, mesh.triangles)
-    points = decode_positions(frame.layer(GEOMETRY), around)
+    mesh.triangles, points, around = decode_triangles_and_points(frame, frame.vertices, frame.triangles)
     if COLOUR in frame.layers:
         mesh.colours = decode_colours(frame.layer(COLOUR), points, around, frame.colour_step)
     if NORMALS in frame.layers:
         mesh.normals = decode_attributes(frame.layer(NORMALS), 3, around=around)
     if TEXCOORDS in frame.layers:
         mesh.texcoords = decode_attributes(frame.layer(TEXCOORDS), 2, around=around)
-    for p in points:
-        check(max(abs(x) for x in p) <= L // frame.geometry_step, "a vertex is off the lattice")
-    mesh.positions = [tuple(x * frame.geometry_step for x in p) for p in points]
+    mesh.positions = on_lattice(points, frame.geometry_step)
     return mesh

@@ -128,7 +128,7 @@ def read_metadata(read):
 # ---------------------------------------------------------------------------------------------- 4. frame payload
 
 (POSE, TRANSFORMS, GEOMETRY, COLOUR, NORMALS, TEXCOORDS, MAPPING, FANS, DISTANCE_ORDERS, EXTERNAL,
- CODED_BONES, TRACKED_RUN, REMOVED, BORDER, CHARTS, PRESENCE, REASON) = range(1, 18)
+ CODED_BONES, TRACKED_RUN, REMOVED, BORDER, CHARTS, PRESENCE, REASON, LEVELS, LEVEL_COLOURS) = range(1, 20)
 
 REASONS = "none", "due", "patches", "surface", "region", "strays", "border", "texture", "rate", "cut"  # 8.20
 
@@ -158,7 +158,7 @@ def read_frame_payload(payload):
     frame.layers = {}
     for number, size in table:
         layer = read.take(size)
-        if number < 18:
+        if number < 20:
             check(number not in frame.layers, "a layer comes twice")
             frame.layers[number] = layer
     return frame

@@ -34,13 +34,13 @@ Pose moved_pose(const DecoderState& state, std::span<const QuantisedTransform> t
     return pose;
 }
 
-// Connectivity, colours and texture coordinates are those of the I-frame, and so is what is there.
+// Connectivity, colours and texture coordinates are those of the I-frame, and so are what is there and the detail.
 void show_animated(DecoderState& state, const AnimatedFrame& frame) {
     const auto& mesh = state.reference->mesh();
     const auto& presence = state.reference->presence;
     show(state,
          {frame.positions, mesh.triangles, mesh.colours, frame.normals, mesh.texcoords, &state.reference->textured,
-          presence},
+          presence, &state.reference->detail},
          state.reference_topology, moved_pose(state, frame.transforms));
 }
 

@@ -248,7 +248,11 @@ std::uint64_t kept_memory(const DecoderState& state, const Packet& packet, const
     const MeshCounts renewed{coded.vertices + (adds ? held.vertices : 0),
                              coded.triangles + (adds ? held.triangles : 0)};
     if (rules.renews && state.header->node_spacing > 0) kept += memory_of_tracking(renewed);
-    if (state.unreferred) kept += memory_of_reference(counts(state.unreferred->mesh));
+    if (state.unreferred)
+        kept += memory_of_reference(counts(state.unreferred->mesh)) +
+                memory_of_detail_vertex * state.unreferred->detail.vertices();
+    // What stays of the detail under a patch is as much at most.
+    if (state.reference) kept += memory_of_detail_vertex * state.reference->detail.vertices() * (adds ? 2 : 1);
     if (state.header->texture.layout == TextureLayout::charts) {
         kept += memory_of_charts(held);
         if (rules.renews) kept += memory_of_charts(renewed);
@@ -263,7 +267,7 @@ std::uint64_t kept_memory(const DecoderState& state, const Packet& packet, const
 }
 
 // The payload of a frame, once its header shows that this decoder may decode it.
-Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& packet, const FrameRules& rules) {
+Result<FramePayloadView> read_frame(DecoderState& state, const Packet& packet, const FrameRules& rules) {
     if (!state.header) return fail(ErrorKind::corrupt_stream, "a frame came before any sequence header");
     // A run has no header: the frame's counts are those of its reference.
     const bool is_run = rules.is_run && state.header->version >= tracked_run_version;
@@ -278,9 +282,10 @@ Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& pac
     const MeshCounts coded{header.vertices, header.triangles};
     const bool refers = rules.refers_to != RefersTo::nothing && state.reference;
     const auto reference = refers ? counts(state.reference->mesh()) : MeshCounts{};
-    if (auto ok = check_limits(rules.memory, coded, reference, kept_memory(state, packet, rules, coded), state.options);
-        !ok)
+    const auto kept = kept_memory(state, packet, rules, coded);
+    if (auto ok = check_limits(rules.memory, coded, reference, kept, state.options); !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
+    state.spare_memory = state.options.max_memory - kept - memory_of_frame(rules.memory, coded, reference);
     if (rules.refers_to == RefersTo::reference)
         if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
     return payload;

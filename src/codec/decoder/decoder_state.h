@@ -120,6 +120,7 @@ struct DecoderState {
     DecodedBones bones;
     DecodedNodes nodes;
     std::optional<UnreferredIntra> unreferred;  // where that is the newest frame
+    std::uint64_t spare_memory = 0;  // bytes that detail of the frame being decoded may take, beside what is counted
     ShownFrame shown;
 };
 

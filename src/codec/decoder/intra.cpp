@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "codec/decoder/frame_decoders.h"
+#include "codec/format/decoder_limits.h"
 #include "codec/format/frame_kinds.h"
 #include "codec/intra/intra_frame.h"
 #include "codec/intra/leveled_frame.h"
@@ -18,10 +19,8 @@ struct IntraMesh {
 
 Result<IntraMesh> decode_mesh(const DecoderState& state, const Packet& packet, const FramePayloadView& payload) {
     if (payload.header.intra_coder == intra_coder_levels) {
-        // What is kept of a vertex of the detail takes about as much memory as what is of others.
-        constexpr std::uint64_t bytes_of_vertex = 1024;
-        const auto most =
-            std::min<std::uint64_t>(state.options.max_vertices, state.options.max_memory / bytes_of_vertex);
+        const auto most = std::min<std::uint64_t>(
+            state.options.max_vertices, payload.header.vertices + state.spare_memory / memory_of_detail_vertex);
         auto leveled = decode_leveled_frame(payload, static_cast<std::size_t>(most), state.threads);
         if (!leveled) return tl::unexpected(leveled.error());
         return IntraMesh{std::move(leveled->mesh), std::move(leveled->detail)};

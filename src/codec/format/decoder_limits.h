@@ -19,6 +19,7 @@ std::uint64_t memory_of_charts(MeshCounts mesh);         // what charts add to i
 std::uint64_t memory_of_tracking(MeshCounts mesh);       // what T-frames add to it
 std::uint64_t memory_of_tracked_frame(MeshCounts mesh);  // one that is kept for others of its group
 std::uint64_t memory_of_presence(MeshCounts mesh);       // what telling what is there adds to tracking
+inline constexpr std::uint64_t memory_of_detail_vertex = 1024;  // of the levels below a reference, and while shown
 
 // What decoding a frame of some kind takes besides, the frame itself included; in frame_kinds.cpp for each kind.
 struct MemoryBound {

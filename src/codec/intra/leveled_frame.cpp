@@ -68,8 +68,8 @@ Result<LeveledFrame> decode_leveled_frame(const FramePayloadView& payload, std::
     const auto runs = layer.subspan(in.position());
     const auto header = read_levels_header(runs);
     if (!header) return tl::unexpected(header.error());
-    const std::size_t most = std::min(most_vertices, (most_detail + 1) * std::size_t{counts.vertices});
-    auto surface = decode_surface_levels(runs, *base, most);
+    const auto most = std::min<std::uint64_t>(most_vertices, std::uint64_t{most_detail + 1} * counts.vertices);
+    auto surface = decode_surface_levels(runs, *base, static_cast<std::size_t>(most));
     if (!surface) return tl::unexpected(surface.error());
     auto out = leveled_frame(header->levels, std::move(*surface), referred);
     if (out.mesh.positions.size() != counts.vertices || out.mesh.triangles.size() != counts.triangles)

@@ -1,4 +1,4 @@
-// An I-frame as a base mesh and the levels of its surface (docs/bitstream.md, section 8.21). The base is coded as a
+// An I-frame as a base mesh and the levels of its surface (docs/bitstream.md, section 6.9). The base is coded as a
 // mesh of its own; the levels follow in a layer. Frames refer to the mesh of one of the first levels, which has the
 // frame's attributes; those below it are its detail, which it is shown with.
 //

@@ -8,7 +8,7 @@ namespace htvm::internal {
 namespace {
 
 constexpr std::uint64_t most_in_header = 1 << 20;  // of the longest edge and of the step
-constexpr std::uint64_t most_run = 1 << 30;        // bytes
+constexpr std::uint64_t most_run = 1 << 28;        // bytes: all runs together stay below 2^32
 
 // The class of a magnitude or of a sum of some, growing with its logarithm.
 std::size_t magnitude_class(std::uint64_t quarters, std::size_t classes) {

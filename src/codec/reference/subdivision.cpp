@@ -304,9 +304,10 @@ std::optional<SubdivisionLevel> split_edges(std::span<const Vector3d> places, st
     }
     if (wanted.size() > most_vertices - std::min<std::size_t>(level.first, most_vertices)) return std::nullopt;
     // Triangles may lie on each other, and grow though vertices do not.
-    std::size_t cut = triangles.size();
-    for (const auto e : wanted) cut += edges.sides[e];
-    if (cut > 4 * most_vertices) return std::nullopt;
+    std::uint64_t pieces = triangles.size();
+    for (const auto e : wanted) pieces += edges.sides[e];
+    if (pieces > std::uint64_t{4} * most_vertices) return std::nullopt;
+    const auto cut = static_cast<std::size_t>(pieces);
     level.stencils = edge_stencils(places.size(), triangles, edges, wanted);
     level.beside.reserve(wanted.size());
     for (const auto own : wanted) {

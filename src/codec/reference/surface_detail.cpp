@@ -92,7 +92,8 @@ SurfaceDetail detail_that_stays(const SurfaceDetail& before, std::size_t vertice
     // Splits that stay, by their ends.
     struct Split {
         std::array<std::uint32_t, 2> ends;
-        std::uint32_t vertex;  // before
+        std::uint32_t vertex;     // before
+        std::uint32_t taken = 0;  // of the first with these ends: how many of them are taken over
     };
     std::vector<Split> splits;
     for (std::size_t k = 0; k < before.levels.size(); ++k) {
@@ -110,9 +111,14 @@ SurfaceDetail detail_that_stays(const SurfaceDetail& before, std::size_t vertice
         std::vector<double> displacements;
         std::vector<std::array<std::int32_t, 3>> colours;
         for (std::size_t e = 0; e < edges.size(); ++e) {
-            const auto found = std::lower_bound(splits.begin(), splits.end(), edges.ends[e],
-                                                [](const Split& s, const auto& ends) { return s.ends < ends; });
+            auto found = std::lower_bound(splits.begin(), splits.end(), edges.ends[e],
+                                          [](const Split& s, const auto& ends) { return s.ends < ends; });
+            // Those that are taken stay in front of the others with the same ends, and say how many they are.
             if (found == splits.end() || found->ends != edges.ends[e]) continue;
+            const auto first = found;
+            found += static_cast<std::ptrdiff_t>(first->taken);
+            if (found == splits.end() || found->ends != edges.ends[e]) continue;
+            ++first->taken;
             is_split[e] = 1;
             number[found->vertex] = static_cast<std::uint32_t>(places.size() + displacements.size());
             const std::size_t own = found->vertex - vertices_before;
@@ -121,7 +127,8 @@ SurfaceDetail detail_that_stays(const SurfaceDetail& before, std::size_t vertice
         }
         MeshEdges next;
         const auto& triangles = k == 0 ? patched.triangles : out.levels.back().triangles;
-        auto split = split_edges(places, triangles, edges, is_split, no_element, &next);
+        auto split =
+            split_edges(places, triangles, edges, is_split, patched.positions.size() + before.vertices(), &next);
         if (!split) break;
         for (const auto& s : split->stencils) places.push_back((places[s.a] + places[s.b]) * 0.5);
         edges = std::move(next);

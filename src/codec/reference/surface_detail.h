@@ -45,7 +45,10 @@ void add_detail(const SurfaceDetail& detail, std::size_t shown, std::vector<std:
 LatticeMesh detailed(const SurfaceDetail& detail, LatticeMesh mesh);
 
 // After a patch: what is still there of the detail. An edge of the new mesh is split if both its ends stay and it was
-// split before. stays: the vertices of the mesh before that stay, ascending; these are the first of the new mesh.
+// split before; where several edges have the same ends, each split is taken over once, so the detail never grows. It
+// ends with the level before the first that would have more than four triangles for each vertex of the mesh and of the
+// detail before: triangles of a patch that lie on each other are all cut where they meet the detail. stays: the
+// vertices of the mesh before that stay, ascending; these are the first of the new mesh.
 SurfaceDetail detail_that_stays(const SurfaceDetail& before, std::size_t vertices_before,
                                 std::span<const std::uint32_t> stays, const LatticeMesh& patched);
 
