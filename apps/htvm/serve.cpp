@@ -250,6 +250,7 @@ void add_limits(CLI::App& command, Options& options) {
     };
     add_bytes("--message-bytes", options.hub.packet_bytes, "A publisher's largest message");
     add_bytes("--memory", options.hub.memory, "All packets of live streams, kept, waiting, and come in part");
+    add_bytes("--stream-memory", options.hub.stream_memory, "Of these, those of one stream");
     const auto add_time = [&](const char* name, auto& limit, const std::string& text) {
         const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit).count();
         command

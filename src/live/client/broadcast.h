@@ -93,6 +93,9 @@ public:
     };
     std::optional<std::vector<Placed>> kept() const;
     std::uint64_t next_place() const { return next_place_; }
+    // Frees what is kept for those who may still join: they wait for the next I-frame. Those who watch are not
+    // affected, unless something waits for them.
+    void drop_kept() { forget_all_but({}); }
     // Begins anew, as after a pause in which nothing was pushed. Those who watch wait for the next frame.
     void forget();
 

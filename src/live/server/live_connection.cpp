@@ -35,6 +35,7 @@ constexpr std::size_t piece_bytes = 65536;  // of a message that is being read
 // What a coroutine that writes waits for: that there is something to write, or the end.
 struct News {
     net::steady_timer timer;                          // cancelled when there is
+    bool writing = false;                             // until the other side has taken it
     bool ended = false;                               // the connection is of no use any more
     std::optional<websocket::close_reason> theirs{};  // if the other side closed it
     explicit News(const net::any_io_executor& executor) : timer(executor) {}
@@ -106,7 +107,9 @@ std::string_view text_of(std::span<const std::uint8_t> bytes) {
 // One writer writes texts and packets, one after the other.
 net::awaitable<bool> write(Connection& connection, bool text, net::const_buffer message) {
     connection.socket.text(text);
+    connection.news.writing = true;
     const auto [error, bytes] = co_await connection.socket.async_write(message, awaited);
+    connection.news.writing = false;
     co_return !error;
 }
 
@@ -184,12 +187,18 @@ net::awaitable<void> watch_by_socket(Line line, Request request, std::string nam
     if (!co_await accepted(*connection, request, most_text_bytes)) co_return;
     const WatchOptions options{.stamps = query_value(request.target(), "stamps").has_value()};
     auto& news = connection->news;
-    const auto viewer = hub.watch(
-        name, [&news] { news.timer.cancel(); }, options, Hub::Clock::now());
+    std::optional<Hub::Viewer> watching;
+    const auto wake = [&] {
+        news.timer.cancel();
+        if (news.writing && watching && hub.ends_at_once(*watching))
+            beast::get_lowest_layer(connection->socket).close();
+    };
+    const auto viewer = hub.watch(name, wake, options, Hub::Clock::now());
     if (!viewer) {
         co_await close(*connection, CloseCode::try_later, viewer.error().message);
         co_return;
     }
+    watching = *viewer;
     const Leave leave([&hub, &viewer] { hub.leave(*viewer); });
     const auto receive_part = [&hub, number = *viewer](std::size_t bytes) {
         return hub.receive_part(number, bytes, Hub::Clock::now()).has_value();
@@ -211,8 +220,13 @@ net::awaitable<void> refuse_socket(Line line, Request request, CloseCode code, s
 net::awaitable<void> watch_by_body(Line& line, ResponseHeader header, std::string name, Hub& hub) {
     keep_kernel_buffers_small(line);
     News news(line.get_executor());
-    const auto viewer = hub.watch(
-        name, [&news] { news.timer.cancel(); }, {.texts = false}, Hub::Clock::now());
+    std::optional<Hub::Viewer> watching;
+    const auto wake = [&] {
+        news.timer.cancel();
+        if (news.writing && watching && hub.ends_at_once(*watching)) line.next_layer().close();
+    };
+    const auto viewer = hub.watch(name, wake, {.texts = false}, Hub::Clock::now());
+    if (viewer) watching = *viewer;
     const Leave leave([&hub, &viewer] {
         if (viewer) hub.leave(*viewer);
     });
@@ -241,8 +255,10 @@ net::awaitable<void> watch_by_body(Line& line, ResponseHeader header, std::strin
         }
         line.next_layer().expires_after(silence);
         const auto& bytes = (*packet)->bytes;
+        news.writing = true;
         const auto [error, written] =
             co_await net::async_write(line, http::make_chunk(net::const_buffer(bytes.data(), bytes.size())), awaited);
+        news.writing = false;
         if (error) co_return;
     }
     co_await net::async_write(line, http::make_chunk_last(), awaited);
