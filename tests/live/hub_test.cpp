@@ -386,6 +386,35 @@ TEST_F(HubTest, MessagesThatHaveComeInPartTakeMemoryToo) {
     EXPECT_EQ(hub.counters().refused_publishers_limit, 1u);
 }
 
+// Each packet takes time by how many are kept.
+TEST_F(HubTest, AChainThatGetsTooLongIsTakenUpAgainAtTheNextIntraFrame) {
+    hub = Hub(HubLimits{.broadcast = {.kept_packets = 10}});
+    const auto anna = publishing();
+    const auto watching = viewer();
+    ASSERT_TRUE(hub.receive_packet(anna, intra(0), start));
+    for (std::uint32_t i = 1; i < 20; ++i) ASSERT_TRUE(hub.receive_packet(anna, tracked(i), start));
+    // With the header, ten are kept.
+    EXPECT_EQ(frames(watching), (Frames{0, 1, 2, 3, 4, 5, 6, 7, 8}));
+    EXPECT_EQ(info().undecodable_frames, 11u);
+    EXPECT_EQ(some<KeyFrameRequest>(anna).size(), 1u);
+    ASSERT_TRUE(hub.receive_packet(anna, intra(20), start));
+    ASSERT_TRUE(hub.receive_packet(anna, tracked(21), start));
+    EXPECT_EQ(frames(watching), (Frames{20, 21}));
+}
+
+TEST_F(HubTest, WhoSendsTooMuchThatCarriesNothingIsClosed) {
+    const auto anna = publishing();
+    const auto watching = viewer();
+    for (int i = 0; i < 50; ++i) EXPECT_TRUE(hub.receive_nothing(watching, start));
+    EXPECT_FALSE(hub.receive_nothing(watching, start));
+    EXPECT_EQ(closing(watching), "1008 too many messages that carry nothing");
+    for (int i = 0; i < 1000; ++i) EXPECT_TRUE(hub.receive_nothing(anna, start));
+    EXPECT_FALSE(hub.receive_nothing(anna, start));
+    EXPECT_EQ(closing(anna), "1008 too many messages that carry nothing");
+    EXPECT_EQ(hub.counters().refused_viewers_message, 1u);
+    EXPECT_EQ(hub.counters().refused_publishers_message, 1u);
+}
+
 TEST_F(HubTest, WhoTakesTooLongForAMessageIsCutOff) {
     hub = Hub(HubLimits{.message_time = 5s});
     const auto slow = publishing(), quick = publisher("ben");

@@ -16,6 +16,7 @@ constexpr double publisher_burst = 1000, publisher_texts_each_second = 500;
 
 constexpr const char* memory_used_up = "this hub's memory for packets is used up";
 constexpr const char* too_many_streams = "there are as many streams as this hub carries";
+constexpr const char* too_much_of_nothing = "too many messages that carry nothing";
 constexpr const char* connection_ended = "the connection has ended";
 
 // The header of a message that is exactly one sound packet.
@@ -431,11 +432,22 @@ Result<void> Hub::receive_text(Publisher publisher, std::string_view text, Clock
     return refuse(connection, {ErrorKind::bad_input, refusal->reason}, *refusal->code);
 }
 
+Result<void> Hub::receive_nothing(Publisher publisher, Clock::time_point now) {
+    const auto found = connections_.find(publisher.connection);
+    if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
+    auto& connection = found->second;
+    if (connection.allowance.allow(now)) return {};
+    ++counters_.refused_publishers_message;
+    detach(connection, "the publisher sent too much that carries nothing", now);
+    return refuse(connection, {ErrorKind::bad_input, too_much_of_nothing}, CloseCode::refused);
+}
+
 void Hub::receive_text(Publisher publisher, const FromPublisher& message, Clock::time_point now) {
     heard(publisher, now);
     const auto found = connections_.find(publisher.connection);
     auto* stream = found == connections_.end() ? nullptr : published_by(found->second);
     if (!stream) return;
+    found->second.ends_stream = found->second.ends_stream || std::holds_alternative<EndOfStream>(message);
     if (const auto* heartbeat = std::get_if<HeartbeatFromPublisher>(&message)) {
         stream->last_heartbeat = now;
         if (heartbeat->clock) stream->clock.tell(*heartbeat->clock, now);
@@ -492,11 +504,12 @@ void Hub::leave(Publisher publisher, bool ended_stream, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
     if (found == connections_.end()) return;
     const bool published = found->second.admitted;
+    const bool ends = ended_stream || found->second.ends_stream;
     const auto name = found->second.stream;
     drop(found->second.part, *found->second.share);
     detach(found->second, "the publisher's connection ended", now);
     connections_.erase(found);
-    if (published && ended_stream) end_stream(streams_.find(name), "the publisher ended the stream");
+    if (published && ends) end_stream(streams_.find(name), "the publisher ended the stream");
 }
 
 // Passed on at once, or by tick() once a second has passed since the last one; unless such a frame came meanwhile.
@@ -599,6 +612,16 @@ Result<void> Hub::receive_text(const Viewer& viewer, std::string_view text, Cloc
     watching->closing = refusal;
     watching->wake();
     return fail(ErrorKind::bad_input, refusal->reason);
+}
+
+Result<void> Hub::receive_nothing(const Viewer& viewer, Clock::time_point now) {
+    auto* watching = this->watching(viewer);
+    if (!watching || watching->closing) return fail(ErrorKind::bad_input, connection_ended);
+    if (watching->allowance.allow(now)) return {};
+    ++counters_.refused_viewers_message;
+    watching->closing = Closing{CloseCode::refused, too_much_of_nothing};
+    watching->wake();
+    return fail(ErrorKind::bad_input, too_much_of_nothing);
 }
 
 ForViewer Hub::next(const Viewer& viewer, Clock::time_point now) {

@@ -183,11 +183,13 @@ public:
     // A part of a message came, which takes so many bytes of memory by now, until it is whole:
     // receive_packet() or receive_text(). An error ends the connection: there is no memory for it.
     Result<void> receive_part(Publisher publisher, std::size_t bytes, Clock::time_point now);
+    // What carries nothing, such as a ping, counts as a text message; an error if it is one of too many.
+    Result<void> receive_nothing(Publisher publisher, Clock::time_point now);
     // The line is alive.
     void heard(Publisher publisher, Clock::time_point now);
     ForPublisher next(Publisher publisher);
-    // The connection ended. ended_stream: the publisher said that the stream ended with it; its viewers are sent what
-    // waits for them, and their connections end. Otherwise it may come back.
+    // The connection ended. ended_stream: and so did the stream, as it does too where the publisher said so
+    // (EndOfStream); its viewers are sent what waits for them, and their connections end. Otherwise it may come back.
     void leave(Publisher publisher, bool ended_stream, Clock::time_point now);
 
     // A stream whose publisher is connected to another hub (live/hub/hub_peering.h): it is listed and watched as those
@@ -217,6 +219,7 @@ public:
     Result<void> receive_part(const Viewer& viewer, std::size_t bytes, Clock::time_point now);
     // A text message; an error ends the connection.
     Result<void> receive_text(const Viewer& viewer, std::string_view text, Clock::time_point now);
+    Result<void> receive_nothing(const Viewer& viewer, Clock::time_point now);
     ForViewer next(const Viewer& viewer, Clock::time_point now);
     // Whether the connection ends without waiting for what is being written; wake is called when it comes to that.
     bool ends_at_once(const Viewer& viewer);
@@ -293,6 +296,7 @@ private:
         PartOfMessage part{};
         bool far = false;  // to another hub
         bool admitted = false;
+        bool ends_stream = false;                                 // as the publisher said
         bool hello = true, heartbeat = false, key_frame = false;  // to be written
         Clock::time_point heartbeat_at{};
         std::optional<Closing> closing{};

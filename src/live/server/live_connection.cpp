@@ -34,10 +34,9 @@ constexpr std::size_t piece_bytes = 65536;  // of a message that is being read
 
 // What a coroutine that writes waits for: that there is something to write, or the end.
 struct News {
-    net::steady_timer timer;                          // cancelled when there is
-    bool writing = false;                             // until the other side has taken it
-    bool ended = false;                               // the connection is of no use any more
-    std::optional<websocket::close_reason> theirs{};  // if the other side closed it
+    net::steady_timer timer;  // cancelled when there is
+    bool writing = false;     // until the other side has taken it
+    bool ended = false;       // the connection is of no use any more
     explicit News(const net::any_io_executor& executor) : timer(executor) {}
     net::awaitable<void> wait() {
         timer.expires_at(std::chrono::steady_clock::time_point::max());
@@ -74,10 +73,18 @@ net::awaitable<void> close(Connection& connection, CloseCode code, const std::st
 }
 
 // Reads messages until the connection ends, or one of these says that it should: receive_part(bytes), which is called
-// for each piece with the memory that the message takes by then, and receive(text, message).
-template <class ReceivePart, class Receive>
-net::awaitable<void> read_messages(SharedConnection connection, ReceivePart receive_part, Receive receive) {
+// for each piece with the memory that the message takes by then, and receive(text, message). receive_nothing(): called
+// for each ping and its like; whoever goes on with them after it said no is cut off.
+template <class ReceivePart, class Receive, class ReceiveNothing>
+net::awaitable<void> read_messages(SharedConnection connection, ReceivePart receive_part, Receive receive,
+                                   ReceiveNothing receive_nothing) {
     auto& socket = connection->socket;
+    constexpr int patience = 1000;
+    socket.control_callback(
+        [&socket, receive_nothing, refused = 0](websocket::frame_type kind, beast::string_view) mutable {
+            if (kind == websocket::frame_type::close || receive_nothing() || ++refused < patience) return;
+            beast::get_lowest_layer(socket).close();
+        });
     beast::flat_buffer buffer;
     for (bool wanted = true; wanted;) {
         buffer.clear();
@@ -89,7 +96,6 @@ net::awaitable<void> read_messages(SharedConnection connection, ReceivePart rece
             wanted = receive_part(buffer.capacity());
         } while (!failed && wanted && !socket.is_message_done() &&
                  !(socket.got_text() && buffer.size() > most_text_bytes));
-        if (failed == websocket::error::closed) connection->news.theirs = socket.reason();
         if (failed) {
             connection->news.ended = true;
             break;
@@ -164,10 +170,7 @@ net::awaitable<void> publish_by_socket(Line line, Request request, std::string n
         co_await close(*connection, CloseCode::try_later, publisher.error().message);
         co_return;
     }
-    const Leave leave([&hub, &news, &publisher] {
-        const bool ended_stream = news.theirs && news.theirs->code == websocket::close_code::normal;
-        hub.leave(*publisher, ended_stream, Hub::Clock::now());
-    });
+    const Leave leave([&hub, &publisher] { hub.leave(*publisher, false, Hub::Clock::now()); });
     const auto receive_part = [&hub, number = *publisher](std::size_t bytes) {
         return hub.receive_part(number, bytes, Hub::Clock::now()).has_value();
     };
@@ -177,7 +180,11 @@ net::awaitable<void> publish_by_socket(Line line, Request request, std::string n
                      : hub.receive_packet(number, {message.begin(), message.end()}, now))
             .has_value();
     };
-    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive), net::detached);
+    const auto receive_nothing = [&hub, number = *publisher] {
+        return hub.receive_nothing(number, Hub::Clock::now()).has_value();
+    };
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive, receive_nothing),
+                  net::detached);
     co_await write_messages(*connection, [&] { return hub.next(*publisher); });
 }
 
@@ -208,7 +215,11 @@ net::awaitable<void> watch_by_socket(Line line, Request request, std::string nam
         return hub.receive_text(number, text ? text_of(message) : R"({"type":"binary"})", Hub::Clock::now())
             .has_value();
     };
-    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive), net::detached);
+    const auto receive_nothing = [&hub, number = *viewer] {
+        return hub.receive_nothing(number, Hub::Clock::now()).has_value();
+    };
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive, receive_nothing),
+                  net::detached);
     co_await write_messages(*connection, [&] { return hub.next(*viewer, Hub::Clock::now()); });
 }
 
