@@ -203,8 +203,9 @@ void add_access_options(CLI::App& command, Options& options) {
                         "Who may publish: a file that --add-publisher writes (default: programs on this machine)")
             ->type_name("FILE");
     command
-        .add_option("--add-publisher", options.add_publisher,
-                    "Make a token for the stream of this name, print it, keep its hash in the file, and end")
+        .add_option_function<std::string>(
+            "--add-publisher", [&options](const std::string& name) { options.add_publisher = name; },
+            "Make a token for the stream of this name, print it, keep its hash in the file, and end")
         ->type_name("NAME")
         ->needs(publishers)
         ->configurable(false);

@@ -200,6 +200,7 @@ SharedTexts::SharedTexts(const Site& site, const net::any_io_executor& executor)
 
 net::awaitable<Response> answer(const Site& site, const Route& route, const Request& request,
                                 const net::ip::address& address) {
+    SharedText::Text text;
     auto header = common_header(site);
     if (!site.admission.host_allowed(request))
         co_return empty_response(http::status::misdirected_request, std::move(header));
@@ -218,17 +219,20 @@ net::awaitable<Response> answer(const Site& site, const Route& route, const Requ
         case Handler::file_list:
             if (const auto refusal = site.admission.refuse_lists())
                 co_return refusing_response(*refusal, std::move(header));
-            co_return text_response(co_await site.texts->files.fresh(), json_type, std::move(header));
+            text = co_await site.texts->files.fresh();
+            co_return text_response(std::move(text), json_type, std::move(header));
         case Handler::stream_list:
             if (const auto refusal = site.admission.refuse_lists())
                 co_return refusing_response(*refusal, std::move(header));
-            co_return text_response(co_await site.texts->streams.fresh(), json_type, std::move(header));
+            text = co_await site.texts->streams.fresh();
+            co_return text_response(std::move(text), json_type, std::move(header));
         case Handler::health:
             co_return answer_health(site, std::move(header));
         case Handler::metrics:
             if (!site.admission.may_read_metrics(request, address))
                 co_return empty_response(http::status::forbidden, std::move(header));
-            co_return text_response(co_await site.texts->metrics.fresh(), metrics_type, std::move(header));
+            text = co_await site.texts->metrics.fresh();
+            co_return text_response(std::move(text), metrics_type, std::move(header));
         case Handler::publish:
         case Handler::watch:  // carry() does
         case Handler::nothing:

@@ -24,7 +24,8 @@ net::awaitable<SharedText::Text> SharedText::fresh() {
         net::steady_timer pause(news_.get_executor(), next_);
         co_await pause.async_wait(awaited);
         ++begun_;
-        text_ = std::make_shared<const std::string>(co_await make_());
+        auto text = co_await make_();
+        text_ = std::make_shared<const std::string>(std::move(text));
         made_ = begun_;
         making_ = false;
         next_ = std::chrono::steady_clock::now() + pause_;
