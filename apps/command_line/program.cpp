@@ -20,6 +20,7 @@
 #include "command_line/manual.h"
 #include "command_line/option_text.h"
 #include "command_line/terminal.h"
+#include "command_line/visible.h"
 #include "core/edit_distance.h"
 #include "io/output_file.h"
 
@@ -236,7 +237,7 @@ std::vector<std::string> asked_words(int argc, char** argv) {
 }
 
 int exit_with(const Program& program, const Error& error) {
-    fmt::print(stderr, "{}: error: {}\n", program.name, error.message);
+    fmt::print(stderr, "{}: error: {}\n", program.name, visible_lines(error.message));
     return interruption() != 0 ? 128 + interruption() : exit_code(error.kind);
 }
 

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cstdio>
 
+#include "command_line/visible.h"
+
 namespace htvm::app {
 namespace {
 
@@ -22,12 +24,12 @@ bool quiet = false;
 void speak_as(const std::string& program) { speaker = program; }
 void quieten() { quiet = true; }
 void note(const std::string& line) {
-    if (!quiet) fmt::print(stderr, "{}: {}\n", speaker, line);
+    if (!quiet) fmt::print(stderr, "{}: {}\n", speaker, visible_lines(line));
 }
 void tell(const std::string& lines) {
     if (!quiet) fmt::print(stderr, "{}", lines);
 }
-void warn(const std::string& line) { fmt::print(stderr, "{}: warning: {}\n", speaker, line); }
+void warn(const std::string& line) { fmt::print(stderr, "{}: warning: {}\n", speaker, visible_lines(line)); }
 
 std::string counted(std::size_t count, const std::string& what) {
     return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");

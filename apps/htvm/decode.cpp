@@ -435,7 +435,8 @@ void tell_what_was_written(const Options& options, const MeshOutput& output, con
 }
 
 // An error if the stream is incomplete.
-Result<void> judge(const Options& options, const MeshOutput& output, const StreamInput& input, const Summary& summary) {
+Result<void> judge(const Options& options, const MeshOutput& output, const StreamInput& input, const Summary& summary,
+                   std::size_t lost_pictures) {
     const auto lost = summary.undecodable + summary.missing;
     if (summary.refused && input.oversized_packets() == 0)
         return fail(summary.refused->kind, fmt::format("{}: {} frames could not be decoded; the first: {}",
@@ -448,6 +449,10 @@ Result<void> judge(const Options& options, const MeshOutput& output, const Strea
                             counted(summary.decoded, "frame") + (summary.decoded == 1 ? " was" : " were"), lost));
             !whole)
             return whole;
+    if (lost == 0 && summary.damaged_packets == 0 && lost_pictures > 0)
+        return fail(ErrorKind::corrupt_stream,
+                    fmt::format("{}: {} of the texture could not be decoded; no frame was lost", options.input,
+                                counted(lost_pictures, "picture")));
     if (lost == 0 && summary.damaged_packets == 0) return {};
     if (lost == 0)
         return fail(ErrorKind::corrupt_stream,
@@ -507,6 +512,7 @@ Result<void> decode(const Options& options) {
     summary.due = static_cast<std::uint32_t>(options.first);
     SoundOutput sound(options.audio, {options.first, options.frames});
     const bool sound_beside = !options.audio.empty() && !apart;
+    std::size_t lost_pictures = 0;
     {
         Progress progress("decoding", options.frames);
         Decoding decoding{options, *input, *output, decoder, summary, progress};
@@ -519,6 +525,7 @@ Result<void> decode(const Options& options) {
         }
         if (auto ok = write_held(decoding); !ok) return ok;
         tell_lost(decoding);
+        lost_pictures = decoding.textures.lost();
     }
     if (auto ok = output->finish(); !ok) return ok;
     if (!options.timestamps.empty())
@@ -531,7 +538,7 @@ Result<void> decode(const Options& options) {
     tell_what_was_written(options, *output, summary);
     if (sound_beside)
         if (auto ok = sound.finish(options.input); !ok) return ok;
-    return judge(options, *output, *input, summary);
+    return judge(options, *output, *input, summary, lost_pictures);
 }
 
 // ---- Options --------------------------------------------------------------------------------------------------------

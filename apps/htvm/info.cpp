@@ -12,6 +12,7 @@
 #include "command_line/capture.h"
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
+#include "command_line/visible.h"
 #include "commands.h"
 #include "htvm/audio.hpp"
 #include "htvm/decoder.hpp"
@@ -97,7 +98,7 @@ void print_sequence(const SequenceInfo& s, const std::string& input) {
     if (s.session != 0) fmt::print("session: {}\n", s.session);
     if (s.up != UpAxis::unknown)
         fmt::print("up: {}{}\n", axis_name(s.up), s.floor ? fmt::format(", the floor at {:g} mm", *s.floor) : "");
-    for (const auto& [key, value] : s.metadata) fmt::print("{}: {}\n", key, value);
+    for (const auto& [key, value] : s.metadata) fmt::print("{}: {}\n", visible(key), visible(value));
     if (s.global_shift != GlobalShift{})
         fmt::print("global shift, which decode adds: {}, {}, {} mm\n", s.global_shift[0], s.global_shift[1],
                    s.global_shift[2]);

@@ -6,10 +6,12 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "commands.h"
 #include "live/hub/stream_name.h"
 #include "live/server/credentials.h"
+#include "live/server/http_request.h"
 
 namespace htvm::app {
 namespace {
@@ -20,11 +22,29 @@ struct Options {
     bool file = false, packets = false;
 };
 
+// A path as an address spells it: what is no letter, digit or one of -_.~/ becomes %XX.
+std::string in_address(const std::string& path) {
+    std::string out;
+    for (const char c : path) {
+        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                           std::string_view("-_.~/").find(c) != std::string_view::npos;
+        out += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    }
+    return out;
+}
+
 Result<void> link(const Options& options) {
     if (!options.file && !live::is_stream_name(options.name))
         return fail(ErrorKind::bad_input, fmt::format("'{}' is no name of a live stream: {}; --file makes a link to a "
                                                       "file",
                                                       options.name, live::stream_name_rule));
+    const auto served = live::path_segments('/' + in_address(options.name));
+    const auto ends = [&](const char* ending) { return options.name.ends_with(ending); };
+    if (options.file && (!served || served->empty() || !(ends(".htvm") || ends(".png") || ends(".jpg"))))
+        return fail(ErrorKind::bad_input,
+                    fmt::format("no hub serves '{}': names end in .htvm, .png or .jpg, and no part of one begins with "
+                                "a dot",
+                                in_address(options.name)));
     const auto keys = live::read_link_keys(options.keys);
     if (!keys) return tl::unexpected(keys.error());
     auto hub = options.hub;
@@ -37,7 +57,7 @@ Result<void> link(const Options& options) {
         live::link_query(*keys, path, std::chrono::system_clock::now() + std::chrono::seconds(options.seconds));
     if (options.packets) hub.replace(0, 4, "ws");  // https becomes wss
     const auto shown = options.file || options.packets ? path : "play/" + options.name;
-    fmt::print("{}/{}?{}\n", hub, shown, query);
+    fmt::print("{}/{}?{}\n", hub, in_address(shown), query);
     return {};
 }
 

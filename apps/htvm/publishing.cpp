@@ -72,6 +72,11 @@ void add_publishing_options(CLI::App& command, PublishingOptions& options) {
         ->group(heading::live);
     add_hub_trust(command, options.trust);
     command
+        .add_flag("--end", options.ends,
+                  "At the end, tell viewers that the stream has ended; otherwise the hub keeps it for a while, for\n"
+                  "whoever goes on with it")
+        ->group(heading::live);
+    command
         .add_flag("--stamps", options.stamps,
                   "Tell when each frame was sent, for measurements by viewers who ask for it (?stamps)")
         ->group(heading::live);
@@ -113,7 +118,7 @@ Result<Publishing> Publishing::open(const std::string& address, const Publishing
     settings.stamps = options.stamps;
     auto publisher = Publisher::open(address, settings);
     if (!publisher) return tl::unexpected(publisher.error());
-    return Publishing(std::move(*publisher));
+    return Publishing(std::move(*publisher), options.ends);
 }
 
 void Publishing::tell() {
@@ -154,7 +159,8 @@ std::string Publishing::progress() {
 
 Result<void> Publishing::finish() {
     constexpr std::chrono::milliseconds patience{5000}, after_interruption{1000};
-    return publisher_.finish(interruption() == 0 ? patience : after_interruption);
+    const auto timeout = interruption() == 0 ? patience : after_interruption;
+    return ends_ ? publisher_.finish(timeout) : publisher_.leave(timeout);
 }
 
 }  // namespace htvm::app

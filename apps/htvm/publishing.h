@@ -31,6 +31,7 @@ struct PublishingOptions {
     std::vector<std::string> other_hubs;
     HubTrust trust;
     bool stamps = false;
+    bool ends = false;           // viewers are told that the stream has ended, when it has
     bool fixed_bitrate = false;  // while encoding: a full line does not lower the rate
 };
 // Adds --token, --token-file, --stamps and those of the trust.
@@ -68,14 +69,15 @@ public:
     LineState line() const;
     // For the line of progress: the rate of the last seconds, viewers, what waits, what was dropped.
     std::string progress();
-    // The end of the stream, once the hub has all of it.
+    // Leaves once the hub has all of it.
     Result<void> finish();
 
 private:
-    explicit Publishing(Publisher publisher) : publisher_(std::move(publisher)) {}
+    Publishing(Publisher publisher, bool ends) : publisher_(std::move(publisher)), ends_(ends) {}
     void tell();
 
     Publisher publisher_;
+    bool ends_;
     std::string told_;                                // trouble
     std::chrono::steady_clock::time_point looked_{};  // when the rate was last measured
     std::uint64_t bytes_then_ = 0;

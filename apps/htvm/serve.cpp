@@ -23,7 +23,8 @@ struct Options {
     live::ServerOptions server;
     live::HubLimits hub;
     live::RecorderOptions recorder;
-    std::string add_publisher, congestion_control = "bbr";
+    std::optional<std::string> add_publisher{};  // only to make a token
+    std::string congestion_control = "bbr";
     bool same_site = false, add_link_key = false, json = false;
     Options() {
         server.port = 8080;
@@ -57,6 +58,9 @@ void write_event(const live::Event& event, bool json) {
     }
 }
 
+// Of a name: as many as a person can read.
+constexpr std::uint64_t told_each_second = 20;
+
 // Where to open it in a browser.
 std::string address_of(const live::ServerOptions& server, std::uint16_t port) {
     const bool six = server.address.find(':') != std::string::npos;
@@ -65,12 +69,12 @@ std::string address_of(const live::ServerOptions& server, std::uint16_t port) {
 }
 
 Result<void> add_publisher(const Options& options) {
-    const auto token = live::add_publisher(options.server.admission.publishers, options.add_publisher);
+    const auto token = live::add_publisher(options.server.admission.publishers, *options.add_publisher);
     if (!token) return tl::unexpected(token.error());
     note(fmt::format(
         "the token of {}, which is shown only now: {} keeps no more than a hash of it. A hub that runs reads "
         "the file again when it is sent SIGHUP.",
-        options.add_publisher, options.server.admission.publishers));
+        *options.add_publisher, options.server.admission.publishers));
     fmt::print("{}\n", *token);
     return {};
 }
@@ -86,10 +90,16 @@ Result<void> add_link_key(const Options& options) {
 }
 
 Result<void> serve(const Options& options) {
-    const auto log = [json = options.json](const live::Event& event) { write_event(event, json); };
+    const auto log =
+        live::limited([json = options.json](const live::Event& event) { write_event(event, json); }, told_each_second);
     live::Hub hub(options.hub, log);
     auto server = options.server;
-    server.admission.other_sites = !options.same_site && server.admission.origins.empty();
+    // What runs on this machine for this machine is nobody else's: neither by a name that another site lets lead here,
+    // nor by a page of another site in a browser here.
+    const bool for_this_machine = live::is_loopback(server.address);
+    server.admission.loopback_names = for_this_machine;
+    if (for_this_machine) server.admission.hosts.push_back(server.address);
+    server.admission.other_sites = !options.same_site && !for_this_machine && server.admission.origins.empty();
     if (options.congestion_control != "system") server.congestion_control = options.congestion_control;
     server.hub = &hub;
     std::optional<live::Recorder> recorder;
@@ -193,8 +203,9 @@ void add_access_options(CLI::App& command, Options& options) {
                         "Who may publish: a file that --add-publisher writes (default: programs on this machine)")
             ->type_name("FILE");
     command
-        .add_option("--add-publisher", options.add_publisher,
-                    "Make a token for the stream of this name, print it, keep its hash in the file, and end")
+        .add_option_function<std::string>(
+            "--add-publisher", [&options](const std::string& name) { options.add_publisher = name; },
+            "Make a token for the stream of this name, print it, keep its hash in the file, and end")
         ->type_name("NAME")
         ->needs(publishers)
         ->configurable(false);
@@ -210,10 +221,18 @@ void add_access_options(CLI::App& command, Options& options) {
     auto* origins = command
                         .add_option("--origin", server.admission.origins,
                                     "Pages of this site, such as https://a.example, may read and watch, and no other "
-                                    "site's; may be given more than once (default: pages of all sites)")
+                                    "site's; may be given more than once (default: pages of all sites, but none "
+                                    "where the address is this machine's alone)")
                         ->type_name("SITE")
                         ->check(is_site)
                         ->allow_extra_args(false);
+    command
+        .add_option("--host", server.admission.hosts,
+                    "Answer requests for this host, such as hub.example, and for this machine's own address alone; may "
+                    "be given more than once (default: any host, but none other where the address is this machine's "
+                    "alone)")
+        ->type_name("NAME")
+        ->allow_extra_args(false);
     command.add_flag("--same-site", options.same_site, "Pages of no other site may read and watch")->excludes(origins);
 }
 
@@ -250,6 +269,7 @@ void add_limits(CLI::App& command, Options& options) {
     };
     add_bytes("--message-bytes", options.hub.packet_bytes, "A publisher's largest message");
     add_bytes("--memory", options.hub.memory, "All packets of live streams, kept, waiting, and come in part");
+    add_bytes("--stream-memory", options.hub.stream_memory, "Of these, those of one stream");
     const auto add_time = [&](const char* name, auto& limit, const std::string& text) {
         const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit).count();
         command
@@ -259,6 +279,8 @@ void add_limits(CLI::App& command, Options& options) {
             ->check(CLI::Range(1, 3600));
     };
     add_time("--header-time", server.header_time, "a request's header, and for agreeing on TLS");
+    add_time("--grace", options.hub.remembered_without_publisher,
+             "a stream's publisher to come back, before its viewers are told that it has ended");
     add_time("--message-time", options.hub.message_time, "a message of a publisher or viewer, from its first part on");
 }
 
@@ -330,7 +352,7 @@ void add_serve(CLI::App& app, Run& run) {
         "  htvm serve --address :: --cert chain.pem --key key.pem --publishers publishers.json");
     command->callback([options, &run] {
         run = [options] {
-            if (!options->add_publisher.empty()) return add_publisher(*options);
+            if (options->add_publisher) return add_publisher(*options);
             return options->add_link_key ? add_link_key(*options) : serve(*options);
         };
     });

@@ -25,6 +25,7 @@ void TextureOutput::begin_sequence() {
 
 void TextureOutput::take(const Packet& packet) {
     if (const auto taken = decoder_.decode(packet); !taken) {
+        ++lost_;
         if (!std::exchange(told_, true))
             warn(fmt::format("the picture of frame {} is lost: {}; the one before is shown", packet.frame,
                              taken.error().message));

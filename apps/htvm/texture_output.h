@@ -1,6 +1,7 @@
 // The pictures of a textured stream as image files beside its meshes.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -32,6 +33,8 @@ public:
     void begin_sequence();
     // The last picture; bytes are null before the first. Made when it is asked for.
     Result<ImageFile> image();
+    // How many could not be decoded.
+    std::size_t lost() const { return lost_; }
 
 private:
     ImageFormat format_;
@@ -39,6 +42,7 @@ private:
     ImageFile file_;
     bool stale_ = false;  // there is a newer picture than file_ has
     bool told_ = false;
+    std::size_t lost_ = 0;
 };
 
 }  // namespace htvm::app

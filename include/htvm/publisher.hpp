@@ -56,7 +56,7 @@ public:
     static Result<Publisher> open(const std::string& url, const PublisherOptions& options = {});
     Publisher(Publisher&&) noexcept;
     Publisher& operator=(Publisher&&) noexcept;
-    ~Publisher();  // without finish(), the hub waits for it to come back
+    ~Publisher();  // as leave(), but what waits is lost
 
     // The stream's next packet: first a sequence header with a session of its own, drawn for this run
     // (EncoderOptions::session). Index packets are passed over. bad_input once the hub has refused the stream for good,
@@ -65,11 +65,15 @@ public:
     // Whether the next frame should be an I-frame, since somebody cannot go on without one. True once for each time.
     bool wants_key_frame();
     PublisherState state() const;
-    // Sends what waits and ends the stream. limit if the line did not take it all in this time.
+    // Sends what waits and ends the stream: viewers are told so. limit if the line did not take it all in this time.
     Result<void> finish(std::chrono::milliseconds timeout = std::chrono::seconds(5));
+    // Likewise, but the stream does not end: the hub keeps it and its viewers for whoever goes on with it, for 10 s if
+    // it was not told otherwise. For a program that is started again.
+    Result<void> leave(std::chrono::milliseconds timeout = std::chrono::seconds(5));
 
 private:
     explicit Publisher(std::unique_ptr<State> state);
+    Result<void> end(std::string last_words, std::chrono::milliseconds timeout);
     std::unique_ptr<State> state_;
 };
 

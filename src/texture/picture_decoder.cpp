@@ -77,7 +77,7 @@ public:
         if (!last) return corrupt("its AV1 shows nothing");
         const auto& shown = *last;
         if (shown.p.bpc != 8 || shown.p.layout != DAV1D_PIXEL_LAYOUT_I420)
-            return fail(ErrorKind::unsupported, "picture: its AV1 is not 4:2:0 with 8 bits");
+            return corrupt("its AV1 is not 4:2:0 with 8 bits");
         Decoded out;
         out.planes.width = static_cast<std::uint32_t>(shown.p.w);
         out.planes.height = static_cast<std::uint32_t>(shown.p.h);
@@ -140,8 +140,7 @@ public:
         const vpx_image_t* shown = nullptr;
         while (const auto* image = vpx_codec_get_frame(&context_, &next)) shown = image;
         if (!shown) return corrupt("its VP9 shows nothing");
-        if (shown->fmt != VPX_IMG_FMT_I420 || shown->bit_depth != 8)
-            return fail(ErrorKind::unsupported, "picture: its VP9 is not 4:2:0 with 8 bits");
+        if (shown->fmt != VPX_IMG_FMT_I420 || shown->bit_depth != 8) return corrupt("its VP9 is not 4:2:0 with 8 bits");
         Decoded out;
         out.planes.width = shown->d_w;
         out.planes.height = shown->d_h;
@@ -242,7 +241,9 @@ struct PictureDecoder::State {
             return fail(ErrorKind::unsupported,
                         std::string("picture: ") + name_of(read.coder) + " files are not read here");
         auto decoded = options.read_image_file(read.coded);
-        if (!decoded) return fail(decoded.error().kind, "picture: " + decoded.error().message);
+        if (!decoded && decoded.error().kind == ErrorKind::limit)
+            return fail(ErrorKind::limit, "picture: " + decoded.error().message);
+        if (!decoded) return corrupt(decoded.error().message);
         if (static_cast<std::uint32_t>(decoded->width) != read.width ||
             static_cast<std::uint32_t>(decoded->height) != read.height)
             return corrupt("it is of another size than its packet says");

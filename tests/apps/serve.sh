@@ -65,6 +65,24 @@ start --record recordings --record-minutes 60
 [ "$(ask "$url/healthz")" = "200 ok" ] || fail "is not well: $(ask "$url/healthz")"
 ask "$url/metrics" | grep -q '^htvm_recording_faults_total 0$' || fail "no metrics of recordings: $(ask "$url/metrics")"
 stop TERM
+# On this machine's own address neither other hosts' names nor other sites' pages count, unless they are told.
+asked() { python3 - "$url" "$@" <<'PYTHON'
+import sys, urllib.error, urllib.request
+try:
+    with urllib.request.urlopen(urllib.request.Request(sys.argv[1] + "/files/person.htvm", headers=dict([sys.argv[2].split("=")])), timeout=10) as answer:
+        print(answer.status, answer.headers["Access-Control-Allow-Origin"])
+except urllib.error.HTTPError as error:
+    print(error.code)
+PYTHON
+}
+start --files streams
+[ "$(asked Host=evil.example)" = 421 ] || fail "another host's name counts: $(asked Host=evil.example)"
+[ "$(asked Origin=https://evil.example)" = "200 None" ] || fail "another site's page may read: $(asked Origin=https://evil.example)"
+stop TERM
+start --files streams --host hub.example --origin https://A.example
+[ "$(asked Host=Hub.example:80)" = "200 None" ] || fail "the host that is told does not count"
+[ "$(asked Origin=https://a.example:443)" = "200 https://a.example:443" ] || fail "the site that is told may not read"
+stop TERM
 start
 grep -q "programs on this machine may publish" err || fail "does not say who may publish: $(cat err)"
 [ "$(ask "$url/files/person.htvm")" = "404 " ] || fail "serves files without a folder"
@@ -77,6 +95,7 @@ token=$("$htvm" serve --publishers publishers.json --add-publisher anna 2>said)
 grep -q "shown only now" said || fail "says nothing of the token: $(cat said)"
 [ "$(stat -c %a publishers.json)" = 600 ] || fail "others may read the publishers"
 expect 1 "a stream's name has 1 to 64" "$htvm" serve --publishers publishers.json --add-publisher ../anna
+expect 1 "a stream's name has 1 to 64" timeout 5 "$htvm" serve --port 0 --publishers publishers.json --add-publisher ""
 "$htvm" serve --link-keys keys.json --add-link-key 2>said || fail "no key"
 grep -q "has key 1 now" said || fail "says nothing of the key: $(cat said)"
 expect 2 "--for" "$htvm" link anna --keys keys.json
@@ -84,6 +103,10 @@ expect 2 "--for" "$htvm" link anna --keys keys.json --for 2
 expect 1 "no name of a live stream" "$htvm" link a/b --keys keys.json --for 2h
 expect 0 "https://hub.example/play/anna?expires=" "$htvm" link anna --keys keys.json --for 2h --url https://hub.example/
 expect 0 "wss://hub.example/watch/anna?expires=" "$htvm" link anna --keys keys.json --for 2h --url https://hub.example --packets
+expect 0 "https://hub.example/files/a%20b/%3F%23.htvm?expires=" "$htvm" link 'a b/?#.htvm' --file --keys keys.json --for 2h --url https://hub.example
+for name in ../anna.htvm .anna.htvm a//b.htvm notes.txt $'a\eb.htvm'; do
+    expect 1 "no hub serves" "$htvm" link "$name" --file --keys keys.json --for 2h
+done
 start --files streams --link-keys keys.json --publishers publishers.json
 link=$("$htvm" link person.htvm --file --keys keys.json --for 1h --url "$url")
 [ "$(ask "$link")" = "200 person" ] || fail "a good link: $(ask "$link")"

@@ -127,6 +127,23 @@ expect 3 "not part of an undamaged packet" "$htvm" verify damaged.htvm
 "$htvm" decode damaged.htvm -o damaged 2>/dev/null
 [ "$(ls damaged/*.ply | wc -l)" = 9 ] || fail "a damaged picture costs frames"
 
+# A picture whose packet is sound and whose content is not.
+python3 - av1.htvm repaired.htvm <<'PYTHON'
+import struct, sys, zlib
+data = bytearray(open(sys.argv[1], "rb").read())
+at, pictures = 0, 0
+while at < len(data):
+    kind, size = data[at + 4], struct.unpack("<I", data[at + 24 : at + 28])[0]
+    pictures += kind == 12
+    if kind == 12 and pictures == 2:
+        data[at + 50 : at + 32 + size] = bytes(size - 18)
+        data[at + 32 + size : at + 36 + size] = struct.pack("<I", zlib.crc32(data[at + 32 : at + 32 + size]))
+    at += 36 + size
+open(sys.argv[2], "wb").write(data)
+PYTHON
+expect 3 "is not sound" "$htvm" verify repaired.htvm
+expect 3 "of the texture could not be decoded; no frame was lost" "$htvm" decode repaired.htvm -o repaired
+
 # A rate that meshes and pictures share.
 "$htvm" encode walk --profile topology --texture-as captured --bitrate 4 -o rate.htvm 2>/dev/null
 python3 - "$("$htvm" info rate.htvm --json | python3 -c 'import json, sys; print(json.load(sys.stdin)["megabits_per_second"])')" <<'PYTHON' || fail "the rate is not met"

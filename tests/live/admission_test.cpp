@@ -69,6 +69,29 @@ TEST(Admission, OnTheLoopbackOtherHostsAreRefused) {
     }
 }
 
+TEST(Admission, OfHostsWithNamesOthersAreRefused) {
+    Admission named({.hosts = {"Hub.example"}});
+    named.listens_on(8080);
+    for (const char* host : {"hub.example", "HUB.EXAMPLE:8443", "127.0.0.1:8080"})
+        EXPECT_TRUE(named.host_allowed(request(host))) << host;
+    for (const char* host : {"evil.example", "hub.example.evil.example", ""})
+        EXPECT_FALSE(named.host_allowed(request(host))) << host;
+}
+
+TEST(Admission, SitesAreTheSameInAnyCaseAndWithTheirSchemesPort) {
+    Admission one({.origins = {"https://A.example:443", "http://b.example"}});
+    const auto watches = [&](const std::string& origin, const std::string& host) {
+        return one.admit_viewer(request(host, origin), "anna", true, address("192.0.2.1")).has_value();
+    };
+    for (const char* origin : {"https://a.example", "HTTPS://a.EXAMPLE:443", "http://b.example:80"})
+        EXPECT_TRUE(watches(origin, "hub.example")) << origin;
+    for (const char* origin : {"http://a.example", "https://a.example:80", "https://b.example"})
+        EXPECT_FALSE(watches(origin, "hub.example")) << origin;
+    EXPECT_TRUE(watches("https://hub.example", "HUB.example:443"));
+    EXPECT_TRUE(watches("http://hub.example:80", "hub.example"));
+    EXPECT_FALSE(watches("https://hub.example", "hub.example:80"));
+}
+
 TEST(Admission, WithoutPublishersOnlyProgramsOnThisMachinePublish) {
     const Admission admission({.other_sites = true});
     const auto refusal = [&](const Request& request, const std::string& from) {

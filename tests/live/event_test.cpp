@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <vector>
+
 namespace htvm::live {
 namespace {
 
@@ -26,6 +29,14 @@ TEST(Event, ANameCannotWriteLinesOrControlATerminal) {
     EXPECT_EQ(text_line(hostile, time), "13:05:51Z a??[2J?: refused");
     EXPECT_EQ(json_line(hostile, time), R"({"time":"2026-11-22T13:05:51.007Z","event":"refused","text":"refused",)"
                                         R"("stream":"a\n\u001b[2J\ufffd"})");
+}
+
+TEST(Event, OfANameOnlySoManyAreToldInASecond) {
+    std::vector<std::string> told;
+    const auto log = limited([&](const Event& event) { told.push_back(event.name + ' ' + event.text); }, 2);
+    for (int i = 0; i < 100; ++i) log({.name = "refused", .text = "no"});
+    log({.name = "published", .text = "yes"});
+    EXPECT_EQ(told, (std::vector<std::string>{"refused no", "refused no", "published yes"}));
 }
 
 }  // namespace

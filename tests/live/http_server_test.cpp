@@ -94,6 +94,19 @@ TEST_F(HttpServerTest, NothingOutsideTheFolderIsReached) {
     }
 }
 
+TEST_F(HttpServerTest, ARequestNamesOneHost) {
+    start();
+    const auto answer = [&](const std::string& headers) {
+        auto socket = connect();
+        net::write(socket, net::buffer("GET /files/person.htvm HTTP/1." + headers + "Connection: close\r\n\r\n"));
+        return status(read_all(socket));
+    };
+    EXPECT_EQ(answer("1\r\nHost: a.example\r\n"), 200);
+    EXPECT_EQ(answer("1\r\nHost: a.example\r\nHost: b.example\r\n"), 400);
+    EXPECT_EQ(answer("1\r\n"), 400);
+    EXPECT_EQ(answer("0\r\n"), 200);
+}
+
 TEST_F(HttpServerTest, ListsTheStreams) {
     start();
     EXPECT_EQ(body(get("/api/files")), R"([{"bytes":5,"path":"inner/a b.htvm"},{"bytes":20,"path":"person.htvm"}])");

@@ -106,9 +106,10 @@ TEST_F(HubTest, WhatIsPublishedIsWatched) {
 }
 
 TEST_F(HubTest, AStreamBeginsWithASequenceHeader) {
-    const auto headless = publisher(), garbage = publisher();
+    const auto headless = publisher();
     EXPECT_FALSE(hub.receive_packet(headless, intra(0), start));
     EXPECT_EQ(closing(headless), "1008 the first packet must be a sequence header of version 2 or later");
+    const auto garbage = publisher();
     EXPECT_FALSE(hub.receive_packet(garbage, {1, 2, 3}, start));
     EXPECT_EQ(closing(garbage), "1008 the first message is not a packet");
     EXPECT_FALSE(hub.watch(
@@ -220,19 +221,18 @@ TEST_F(HubTest, StreamsAndViewersAreLimited) {
         "anna", [] {}, {}, start));
     hub.leave(*viewers.begin());
     viewer();
-    const auto carl = publisher("carl");
-    ASSERT_TRUE(hub.receive_packet(publisher("ben"), header(1), start));
+    const auto ben = publisher("ben");
+    ASSERT_TRUE(hub.receive_packet(ben, header(1), start));
     const auto third = hub.publish(
         "dora", [] {}, start);
     ASSERT_FALSE(third);
     EXPECT_EQ(third.error().kind, ErrorKind::limit);
-    // Two came while there was room for one: the second to send something is late.
-    EXPECT_FALSE(hub.receive_packet(carl, header(1), start));
-    EXPECT_EQ(closing(carl), "1013 there are as many streams as this hub carries");
-    EXPECT_TRUE(hub.publish(
-        "ben", [] {}, start));
+    // Who comes back has its place still.
+    hub.leave(ben, false, start);
+    const auto late = publisher("ben");
     EXPECT_EQ(hub.counters().refused_viewers_limit, 1u);
-    EXPECT_EQ(hub.counters().refused_publishers_limit, 2u);
+    EXPECT_EQ(hub.counters().refused_publishers_limit, 1u);
+    EXPECT_TRUE(hub.receive_packet(late, header(1), start));
 }
 
 TEST_F(HubTest, MemoryForPacketsIsBounded) {
@@ -252,19 +252,107 @@ TEST_F(HubTest, MemoryForPacketsIsBounded) {
     EXPECT_EQ(closing(publisher), "1013 this hub's memory for packets is used up");
 }
 
-TEST_F(HubTest, WhereNoMemoryIsLeftNobodyIsLetIn) {
-    hub = Hub(HubLimits{.memory = header(1).size()});
-    publishing();
-    EXPECT_EQ(hub.watch(
-                     "anna", [] {}, {}, start)
-                  .error()
-                  .kind,
-              ErrorKind::limit);
+TEST_F(HubTest, OneStreamHasNoMoreThanItsShareOfTheMemory) {
+    const auto size = header(1).size();
+    hub = Hub(HubLimits{.stream_memory = 2 * size});
+    const auto anna = publishing(), ben = publisher("ben");
+    EXPECT_TRUE(hub.receive_packet(anna, intra(0), start));
+    EXPECT_TRUE(hub.receive_packet(anna, tracked(1), start));
+    EXPECT_EQ(hub.counters().dropped_for_memory, 1u);
+    EXPECT_TRUE(hub.receive_packet(ben, header(2), start));
+    EXPECT_EQ(hub.counters().dropped_for_memory, 1u);
+    EXPECT_FALSE(hub.receive_part(anna, 1, start));
+    EXPECT_EQ(closing(anna), "1013 this hub's memory for packets is used up");
+    EXPECT_EQ(hub.counters().gave_way, 0u);
+}
+
+// A token is for one name: seventy-five connections with 14 MB each once ended the streams of others.
+TEST_F(HubTest, OfANameOneConnectionAtATimeMayHaveSentNoPacketYet) {
+    std::vector<Hub::Publisher> all;
+    for (int i = 0; i < 75; ++i) {
+        all.push_back(publisher("eve"));
+        EXPECT_TRUE(hub.receive_part(all.back(), 900'000, start));
+    }
+    for (int i = 0; i < 74; ++i)
+        EXPECT_EQ(closing(all[static_cast<std::size_t>(i)]), "1013 a newer connection publishes this stream");
+    for (int i = 0; i < 74; ++i) hub.leave(all[static_cast<std::size_t>(i)], false, start);
+    EXPECT_EQ(hub.counters().memory, 900'000u);
+    EXPECT_TRUE(hub.receive_packet(all.back(), header(1), start));
+    EXPECT_EQ(hub.counters().memory, header(1).size());
+}
+
+TEST_F(HubTest, AFirstMessageIsNoLargerThanASequenceHeaderMayBe) {
+    const auto eve = publisher("eve");
+    EXPECT_TRUE(hub.receive_part(eve, std::size_t{1} << 20, start));
+    EXPECT_FALSE(hub.receive_part(eve, (std::size_t{1} << 20) + 1, start));
+    EXPECT_EQ(closing(eve), "1009 the first message is too large for a sequence header");
+}
+
+TEST_F(HubTest, AConnectionWithoutAPacketTakesAStreamsPlace) {
+    publisher("ben");
+    publisher("carl");
     EXPECT_EQ(hub.publish(
-                     "ben", [] {}, start)
+                     "dora", [] {}, start)
                   .error()
                   .kind,
               ErrorKind::limit);
+    EXPECT_TRUE(hub.publish(
+        "carl", [] {}, start));
+}
+
+TEST_F(HubTest, WhereMemoryIsUsedUpTheStreamThatHoldsMostGivesWay) {
+    const auto size = header(1).size();
+    hub = Hub(HubLimits{.memory = 10 * size});
+    const auto anna = publishing(), eve = publisher("eve"), mallory = publisher("mallory");
+    const auto watching = viewer();
+    ASSERT_TRUE(hub.receive_packet(eve, header(2), start));
+    ASSERT_TRUE(hub.receive_packet(mallory, header(3), start));
+    ASSERT_TRUE(hub.receive_part(eve, 4 * size, start));
+    ASSERT_TRUE(hub.receive_part(mallory, 3 * size, start));
+    EXPECT_EQ(hub.counters().memory, 10 * size);
+    EXPECT_TRUE(hub.receive_packet(anna, intra(0), start));
+    EXPECT_EQ(frames(watching), Frames{0});
+    EXPECT_EQ(closing(eve), "1013 this hub's memory for packets is used up");
+    EXPECT_EQ(closing(mallory), "");
+    EXPECT_EQ(closing(anna), "");
+    EXPECT_EQ(hub.counters().gave_way, 1u);
+    // Of those that hold most nobody else is disturbed for them.
+    EXPECT_TRUE(hub.receive_part(mallory, 5 * size, start));
+    EXPECT_FALSE(hub.receive_part(mallory, 9 * size, start));
+    EXPECT_EQ(closing(mallory), "1013 this hub's memory for packets is used up");
+    EXPECT_EQ(closing(anna), "");
+}
+
+TEST_F(HubTest, WhoGivesWayLosesViewersWhoDoNotTakeWhatIsTheirsAndKeepsTheOthers) {
+    const auto size = header(1).size();
+    hub = Hub(HubLimits{.memory = 8 * size});
+    const auto anna = publishing(), ben = publisher("ben");
+    ASSERT_TRUE(hub.receive_packet(anna, intra(0), start));
+    const auto waiting = viewer(), writing = viewer(), keeping_up = viewer();
+    for (const auto& each : {waiting, keeping_up}) EXPECT_EQ(frames(each), Frames{0});
+    for (std::uint32_t i = 1; i < 6; ++i) {
+        ASSERT_TRUE(hub.receive_packet(anna, tracked(i), start));
+        EXPECT_EQ(frames(keeping_up), Frames{i});
+    }
+    // A header and what is sent before it are taken, but not written.
+    while (!std::holds_alternative<SharedPacket>(hub.next(writing, start))) {
+    }
+    EXPECT_EQ(hub.counters().memory, 7 * size);
+    ASSERT_TRUE(hub.receive_packet(ben, header(2), start));
+    EXPECT_FALSE(hub.ends_at_once(writing));
+    EXPECT_TRUE(hub.receive_part(ben, size, start));
+    EXPECT_EQ(hub.counters().gave_way, 1u);
+    EXPECT_TRUE(hub.ends_at_once(waiting));
+    EXPECT_TRUE(hub.ends_at_once(writing));
+    EXPECT_FALSE(hub.ends_at_once(keeping_up));
+    hub.leave(waiting);
+    hub.leave(writing);
+    EXPECT_EQ(hub.counters().memory, 2 * size);
+    // It takes nothing for a second, and goes on where it can be decoded.
+    EXPECT_TRUE(hub.receive_packet(anna, intra(6), start + 999ms));
+    EXPECT_TRUE(hub.receive_packet(anna, intra(7), start + 1s));
+    EXPECT_EQ(frames(keeping_up), Frames{7});
+    EXPECT_EQ(closing(anna), "");
 }
 
 TEST_F(HubTest, PacketsThatAreForgottenFreeTheirMemory) {
@@ -279,15 +367,10 @@ TEST_F(HubTest, MessagesThatHaveComeInPartTakeMemoryToo) {
     const auto size = header(1).size();
     hub = Hub(HubLimits{.memory = 1000 + size});
     const auto anna = publishing();
-    const auto ben = publisher("ben");
     const auto watching = viewer();
     EXPECT_TRUE(hub.receive_part(anna, 300, start));
     EXPECT_TRUE(hub.receive_part(anna, 800, start));
     EXPECT_TRUE(hub.receive_part(watching, 100, start));
-    EXPECT_EQ(hub.counters().memory, size + 900);
-    EXPECT_FALSE(hub.receive_part(ben, 101, start));
-    EXPECT_EQ(closing(ben), "1013 this hub's memory for packets is used up");
-    hub.leave(ben, false, start);
     EXPECT_EQ(hub.counters().memory, size + 900);
     EXPECT_TRUE(hub.receive_packet(anna, intra(0), start));  // whole
     EXPECT_EQ(hub.counters().memory, 2 * size + 100);
@@ -296,7 +379,40 @@ TEST_F(HubTest, MessagesThatHaveComeInPartTakeMemoryToo) {
     EXPECT_TRUE(hub.receive_part(watching, 100, start));
     hub.leave(watching);
     EXPECT_EQ(hub.counters().memory, 2 * size);
+    EXPECT_FALSE(hub.receive_part(anna, 1001, start));
+    EXPECT_EQ(closing(anna), "1013 this hub's memory for packets is used up");
+    hub.leave(anna, false, start);
+    EXPECT_EQ(hub.counters().memory, 2 * size);
     EXPECT_EQ(hub.counters().refused_publishers_limit, 1u);
+}
+
+// Each packet takes time by how many are kept.
+TEST_F(HubTest, AChainThatGetsTooLongIsTakenUpAgainAtTheNextIntraFrame) {
+    hub = Hub(HubLimits{.broadcast = {.kept_packets = 10}});
+    const auto anna = publishing();
+    const auto watching = viewer();
+    ASSERT_TRUE(hub.receive_packet(anna, intra(0), start));
+    for (std::uint32_t i = 1; i < 20; ++i) ASSERT_TRUE(hub.receive_packet(anna, tracked(i), start));
+    // With the header, ten are kept.
+    EXPECT_EQ(frames(watching), (Frames{0, 1, 2, 3, 4, 5, 6, 7, 8}));
+    EXPECT_EQ(info().undecodable_frames, 11u);
+    EXPECT_EQ(some<KeyFrameRequest>(anna).size(), 1u);
+    ASSERT_TRUE(hub.receive_packet(anna, intra(20), start));
+    ASSERT_TRUE(hub.receive_packet(anna, tracked(21), start));
+    EXPECT_EQ(frames(watching), (Frames{20, 21}));
+}
+
+TEST_F(HubTest, WhoSendsTooMuchThatCarriesNothingIsClosed) {
+    const auto anna = publishing();
+    const auto watching = viewer();
+    for (int i = 0; i < 50; ++i) EXPECT_TRUE(hub.receive_nothing(watching, start));
+    EXPECT_FALSE(hub.receive_nothing(watching, start));
+    EXPECT_EQ(closing(watching), "1008 too many messages that carry nothing");
+    for (int i = 0; i < 1000; ++i) EXPECT_TRUE(hub.receive_nothing(anna, start));
+    EXPECT_FALSE(hub.receive_nothing(anna, start));
+    EXPECT_EQ(closing(anna), "1008 too many messages that carry nothing");
+    EXPECT_EQ(hub.counters().refused_viewers_message, 1u);
+    EXPECT_EQ(hub.counters().refused_publishers_message, 1u);
 }
 
 TEST_F(HubTest, WhoTakesTooLongForAMessageIsCutOff) {
@@ -447,6 +563,7 @@ TEST_F(HubTest, ThePublishersClockGoesOnByTheHubsOwn) {
 }
 
 TEST_F(HubTest, ASilentPublishersConnectionEndsButNotOneThatHasNoFrames) {
+    hub = Hub();
     const auto silent = publishing(), without_frames = publisher("ben"), nothing = publisher("carl");
     const auto watching = viewer();
     ASSERT_TRUE(hub.receive_packet(without_frames, header(2), start));

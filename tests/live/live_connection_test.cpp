@@ -240,8 +240,27 @@ TEST_F(LiveConnectionTest, ViewersAreToldThatAPublisherIsGoneAndWhenTheStreamEnd
     publisher->send(live_header(1));
     publisher->send(live_tracked(1));
     wait_for_packets(4);
+    publisher->say(R"({"type":"end"})");
     publisher->stream.close(websocket::close_code::normal);
     EXPECT_EQ(viewer.closing(), "1000 the publisher ended the stream");
+}
+
+// As when the encoder is restarted.
+TEST_F(LiveConnectionTest, APublisherWhoLeavesInOrderAndComesBackKeepsItsViewers) {
+    auto before = open("/publish/anna");
+    before.send(live_header(1));
+    before.send(live_intra(0));
+    wait_for_packets(2);
+    auto viewer = open("/watch/anna");
+    EXPECT_EQ(viewer.next()->kind, PacketKind::sequence);
+    EXPECT_EQ(viewer.next_frame(), 0u);
+    before.stream.close(websocket::close_code::normal);
+    EXPECT_EQ(viewer.next_text("gone"), R"({"reason":"the publisher's connection ended","type":"gone"})");
+    auto again = open("/publish/anna");
+    again.send(live_header(1));
+    again.send(live_intra(1));
+    EXPECT_EQ(viewer.next()->kind, PacketKind::sequence);
+    EXPECT_EQ(viewer.next_frame(), 1u);
 }
 
 TEST_F(LiveConnectionTest, MessagesThatAreTooLargeOrNoneEndTheirConnectionAndNoOther) {
@@ -271,6 +290,17 @@ TEST_F(LiveConnectionTest, MessagesThatAreTooLargeOrNoneEndTheirConnectionAndNoO
     EXPECT_EQ(calm.next_frame(), 0u);
     EXPECT_EQ(calm.next_frame(), 1u);
     EXPECT_NE(get("/api/streams").find("\"damaged_messages\":4,"), std::string::npos);
+}
+
+TEST_F(LiveConnectionTest, AFloodOfPingsEndsItsConnectionAndIsCounted) {
+    auto publisher = open("/publish/anna");
+    publisher.send(live_header(1));
+    wait_for_packets(1);
+    auto flood = open("/watch/anna");
+    beast::error_code ignored;
+    for (int i = 0; i < 100; ++i) flood.stream.ping({}, ignored);
+    EXPECT_EQ(flood.closing(), "1008 too many messages that carry nothing");
+    EXPECT_TRUE(metrics_come_to("htvm_refused_total{cause=\"viewer_message\"} 1")) << get("/metrics");
 }
 
 TEST_F(LiveConnectionTest, APublisherWhoseMessageIsTooLargeIsToldSo) {
@@ -303,6 +333,7 @@ TEST_F(RecordedLiveConnectionTest, WhatGoesToTheViewersIsRecorded) {
     wait_for_packets(5);
     const auto metrics = get("/metrics");
     EXPECT_NE(metrics.find("htvm_recording_faults_total 0\n"), std::string::npos) << metrics;
+    publisher.say(R"({"type":"end"})");
     publisher.stream.close(websocket::close_code::normal);
     EXPECT_TRUE(soon([&] { return get("/api/streams").find("anna") == std::string::npos; }));
     stop();

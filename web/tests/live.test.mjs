@@ -420,6 +420,24 @@ for (const [code, said] of [
         if (code === 1013) assert.equal(network.sockets[1].at, 1000);
     });
 
+test('a stream that has ended is looked for again, and goes on without a word in between once it is there', async () => {
+    const { network, last, said } = watching();
+    open(last());
+    last().onclose({ code: 1000, reason: 'goodbye' });
+    assert.equal(said().at(-1), 'ended: goodbye');
+    for (let look = 1; look <= 3; ++look) {
+        await network.advance(5000);
+        assert.equal(network.sockets.length, 1 + look);
+        last().onopen();
+        last().onclose({ code: 1013, reason: 'there is no such stream' });
+    }
+    await network.advance(5000);
+    last().onopen();
+    assert.deepEqual(said(), []);
+    hear(last(), bytesOf(stream[0]));
+    assert.deepEqual(said(), ['open', 'packet 1 0 first']);
+});
+
 test('a viewer by body who was watching tries for 30 s more where the stream is missing, as at a hub that has just started', async () => {
     const { network, last, said } = watching('ws://a.example/watch/me');
     const body = async (response) => {

@@ -49,6 +49,11 @@ bool LivePacket::is_access() const {
 
 std::optional<std::uint64_t> Broadcast::push(SharedPacket packet, Clock::time_point now) {
     if (is_index(packet->header.kind) || is_kept(*packet)) return std::nullopt;
+    const bool begins = packet->header.kind == PacketKind::sequence || packet->header.kind == PacketKind::intra;
+    if (kept_.size() >= limits_.kept_packets && !begins) {
+        if (packet->is_frame()) ++undecodable_;
+        return std::nullopt;
+    }
     const auto sequence = dependencies_.sequences();
     const auto place = dependencies_.push(packet->header);
     next_place_ = place + 1;

@@ -46,6 +46,9 @@ struct BroadcastLimits {
     // How much is kept for those who may still join. If frames since the last I-frame are more, they must wait for the
     // next one; those who watch are not affected.
     std::size_t kept_bytes = std::size_t{64} << 20;
+    // How many packets later frames may need. Each packet takes time by how many there are: what comes beyond is
+    // taken for undecodable, up to the next I-frame.
+    std::size_t kept_packets = 1024;
 };
 
 struct ViewerCounters {
@@ -93,6 +96,9 @@ public:
     };
     std::optional<std::vector<Placed>> kept() const;
     std::uint64_t next_place() const { return next_place_; }
+    // Frees what is kept for those who may still join: they wait for the next I-frame. Those who watch are not
+    // affected, unless something waits for them.
+    void drop_kept() { forget_all_but({}); }
     // Begins anew, as after a pause in which nothing was pushed. Those who watch wait for the next frame.
     void forget();
 

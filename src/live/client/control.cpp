@@ -177,6 +177,8 @@ std::string write_text(const HeartbeatFromPublisher& message) {
     return text_of(out);
 }
 
+std::string write_text(const EndOfStream&) { return text_of({{"type", "end"}}); }
+
 std::string write_text(const HeartbeatToPublisher& message) {
     return text_of({{"type", "heartbeat"},
                     {"viewers", within_range(message.viewers)},
@@ -215,6 +217,7 @@ Result<FromPublisher> read_from_publisher(std::string_view text) {
     FromPublisher out;
     if (members.type() == "heartbeat") out = HeartbeatFromPublisher{members.time("clock")};
     if (members.type() == "stamp") out = read_stamp(members);
+    if (members.type() == "end") out = EndOfStream{};
     return members.result(std::move(out));
 }
 

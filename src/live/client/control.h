@@ -48,6 +48,9 @@ struct HeartbeatFromPublisher {
     std::optional<std::int64_t> clock{};  // at this moment; none before the first frame
 };
 
+// The stream ends with this connection: nobody goes on with it. Without this, a hub waits for who comes back.
+struct EndOfStream {};
+
 struct HeartbeatToPublisher {
     std::uint64_t viewers = 0;
     std::uint64_t packets = 0, bytes = 0;  // taken from this publisher
@@ -81,6 +84,7 @@ struct Stamp {
 
 std::string write_text(const Hello& message);
 std::string write_text(const HeartbeatFromPublisher& message);
+std::string write_text(const EndOfStream& message);
 std::string write_text(const HeartbeatToPublisher& message);
 std::string write_text(const HeartbeatToViewer& message);
 std::string write_text(const KeyFrameRequest& message);
@@ -89,7 +93,7 @@ std::string write_text(const Stamp& message);
 
 // bad_input, with a sentence for the sender: the text is too long, is no JSON object with a "type", lacks a member that
 // its type must have, or one is of another kind or out of range. monostate: a type that this direction does not know.
-using FromPublisher = std::variant<std::monostate, HeartbeatFromPublisher, Stamp>;
+using FromPublisher = std::variant<std::monostate, HeartbeatFromPublisher, Stamp, EndOfStream>;
 using FromViewer = std::variant<std::monostate, KeyFrameRequest>;
 using ToPublisher = std::variant<std::monostate, Hello, HeartbeatToPublisher, KeyFrameRequest>;
 using ToViewer = std::variant<std::monostate, Hello, HeartbeatToViewer, Gone, Stamp>;

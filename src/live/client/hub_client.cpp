@@ -148,6 +148,7 @@ struct HubClient::State {
     HubList hubs;
     ssl::context tls{ssl::context::tls_client};
     bool finishing = false;
+    std::string last_words;                        // before it finishes
     std::optional<Clock::time_point> stood_since;  // the last connection; none: there was none
     mutable std::mutex mutex;
     HubClientStatus status;  // guarded by the mutex
@@ -281,6 +282,7 @@ net::awaitable<void> HubClient::State::write(SharedConnection its) {
             continue;
         }
         if (its->finishing) {
+            if (!last_words.empty() && !co_await write_text(*its, last_words)) break;
             its->closing = true;
             co_await socket.async_close(websocket::close_code::normal, awaited);
             break;
@@ -410,9 +412,10 @@ void HubClient::say(std::string text) {
 
 void HubClient::learn(const std::vector<std::string>& hubs) { state_->hubs.learn(hubs); }
 
-void HubClient::finish() {
-    net::post(state_->context, [state = state_.get()] {
+void HubClient::finish(std::string last_words) {
+    net::post(state_->context, [state = state_.get(), words = std::move(last_words)]() mutable {
         state->finishing = true;
+        state->last_words = std::move(words);
         state->pause.cancel();
         if (!state->connection) return;
         state->connection->finishing = true;

@@ -77,8 +77,8 @@ public:
     void say(std::string text);
     // Other hubs, as a hub tells of them; on the client's thread only.
     void learn(const std::vector<std::string>& hubs);
-    // From any thread: sends what next() still has, then ends with code 1000.
-    void finish();
+    // From any thread: sends what next() still has, then this text, if it is not empty, and ends with code 1000.
+    void finish(std::string last_words = {});
     // From any thread but the client's: ends at once; nothing is called behind it.
     void stop();
     HubClientStatus status() const;

@@ -73,7 +73,10 @@ struct Publisher::State {
     std::optional<HubClient> client;  // the last: its thread uses the rest
 
     explicit State(const PublisherOptions& given)
-        : options(given), broadcast(BroadcastLimits{.bytes = given.queue_bytes, .wait = given.queue_time}) {}
+        : options(given),
+          broadcast(BroadcastLimits{.bytes = given.queue_bytes,
+                                    .wait = given.queue_time,
+                                    .kept_packets = std::numeric_limits<std::size_t>::max()}) {}
     ~State() {
         if (client) client->stop();
     }
@@ -239,8 +242,14 @@ PublisherState Publisher::state() const {
 }
 
 Result<void> Publisher::finish(std::chrono::milliseconds timeout) {
+    return end(write_text(live::EndOfStream{}), timeout);
+}
+
+Result<void> Publisher::leave(std::chrono::milliseconds timeout) { return end({}, timeout); }
+
+Result<void> Publisher::end(std::string last_words, std::chrono::milliseconds timeout) {
     auto& state = *state_;
-    state.client->finish();
+    state.client->finish(std::move(last_words));
     std::unique_lock lock(state.mutex);
     const bool over = state.changed.wait_for(lock, timeout, [&] { return state.ending.has_value(); });
     const auto why = state.ending ? state.ending->reason : state.trouble;

@@ -2,7 +2,10 @@
 
 #include <array>
 #include <ctime>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
 
 namespace htvm::live {
 namespace {
@@ -44,6 +47,25 @@ std::string text_line(const Event& event, std::chrono::system_clock::time_point 
     out += event.text;
     if (!event.address.empty()) out += " (" + event.address + ')';
     return without_control(std::move(out));
+}
+
+Log limited(Log log, std::uint64_t each_second) {
+    using Clock = std::chrono::steady_clock;
+    struct Second {
+        Clock::time_point since{};
+        std::uint64_t events = 0;
+    };
+    return [log = std::move(log), each_second, seconds = std::map<std::string, Second>()](const Event& event) mutable {
+        auto& second = seconds[event.name];
+        const auto now = Clock::now();
+        if (now - second.since >= std::chrono::seconds(1)) {
+            const auto events = std::exchange(second, {now, 0}).events;
+            if (events > each_second)
+                log({.name = event.name,
+                     .text = std::to_string(events - each_second) + " more of these were not told"});
+        }
+        if (++second.events <= each_second) log(event);
+    };
 }
 
 }  // namespace htvm::live

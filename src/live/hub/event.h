@@ -24,6 +24,10 @@ struct Event {
 // Where events go; an empty one: nowhere. Called on the server's thread, so it must not block for long.
 using Log = std::function<void(const Event&)>;
 
+// Passes on at most so many events of a name in a second, so that nobody can fill a disk by being refused; at the next
+// event of the name behind that second it says how many there were besides.
+Log limited(Log log, std::uint64_t each_second);
+
 // One line without its end. As JSON: {"time": "2026-11-22T13:05:51.123Z", "event": name, "text": ..., and the others if
 // there are any, the numbers by their own names}. For people: "13:05:51Z anna: a publisher is connected (192.0.2.1)".
 // Bytes that are no text are replaced, so that nobody can write lines or control a terminal by a name.

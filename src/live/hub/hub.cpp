@@ -15,6 +15,8 @@ constexpr double viewer_burst = 50, viewer_texts_each_second = 10;
 constexpr double publisher_burst = 1000, publisher_texts_each_second = 500;
 
 constexpr const char* memory_used_up = "this hub's memory for packets is used up";
+constexpr const char* too_many_streams = "there are as many streams as this hub carries";
+constexpr const char* too_much_of_nothing = "too many messages that carry nothing";
 constexpr const char* connection_ended = "the connection has ended";
 
 // The header of a message that is exactly one sound packet.
@@ -89,18 +91,49 @@ bool TextAllowance::allow(Clock::time_point now) {
 // ---- Publishers -----------------------------------------------------------------------------------------------------
 
 Result<Hub::Publisher> Hub::publish(const std::string& name, std::function<void()> wake, Clock::time_point now) {
-    const bool full = streams_.size() >= limits_.streams;
-    if (!streams_.contains(name) && (full || !has_memory_for(1))) {
+    // Whoever connects again and again without a first packet has one connection's memory, not one for each.
+    for (auto& [number, other] : connections_)
+        if (other.stream == name && !other.admitted && !other.closing) {
+            ++counters_.refused_publishers_limit;
+            static_cast<void>(
+                refuse(other, {ErrorKind::limit, "a newer connection publishes this stream"}, CloseCode::try_later));
+        }
+    if (!has_place_for(name)) {
         ++counters_.refused_publishers_limit;
-        return fail(ErrorKind::limit, full ? "there are as many streams as this hub carries" : memory_used_up);
+        return fail(ErrorKind::limit, too_many_streams);
     }
+    return connect(name, std::move(wake), now);
+}
+
+// Connections that have yet to begin their stream take its place already.
+bool Hub::has_place_for(const std::string& name) const {
+    if (streams_.contains(name)) return true;
+    std::size_t waiting = 0;
+    for (const auto& [number, other] : connections_)
+        waiting += !other.admitted && !other.closing && !streams_.contains(other.stream) ? 1u : 0u;
+    return streams_.size() + waiting < limits_.streams;
+}
+
+Hub::Publisher Hub::connect(const std::string& name, std::function<void()> wake, Clock::time_point now) {
     const auto number = next_connection_++;
     connections_.emplace(number, Connection{.stream = name,
+                                            .share = memory_.share_of(name),
                                             .wake = std::move(wake),
                                             .allowance = {publisher_burst, publisher_texts_each_second},
                                             .heard = now,
                                             .heartbeat_at = now + limits_.heartbeat});
     return Publisher{number};
+}
+
+// Begins it if there is none.
+Hub::Stream& Hub::stream_named(const std::string& name) {
+    const auto [found, first] = streams_.try_emplace(name);
+    auto& stream = found->second;
+    if (!first) return stream;
+    stream.number = next_stream_++;
+    stream.broadcast = Broadcast(limits_.broadcast);
+    stream.share = memory_.share_of(name);
+    return stream;
 }
 
 // The stream that the connection publishes; null if none.
@@ -150,11 +183,8 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
     if (known == streams_.end()) {
         if (streams_.size() >= limits_.streams) {
             ++counters_.refused_publishers_limit;
-            return fail(ErrorKind::limit, "there are as many streams as this hub carries");
+            return fail(ErrorKind::limit, too_many_streams);
         }
-        auto& stream = streams_[connection.stream];
-        stream.number = next_stream_++;
-        stream.broadcast = Broadcast(limits_.broadcast);
     } else {
         auto& stream = known->second;
         const bool same = stream.checksum == header.reference;
@@ -168,7 +198,7 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
         }
         replace_publisher(stream, header.reference);
     }
-    auto& stream = streams_.at(connection.stream);
+    auto& stream = stream_named(connection.stream);
     stream.connection = number;
     connection.admitted = true;
     changed(connection.stream);
@@ -177,22 +207,20 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
 }
 
 Result<Hub::Publisher> Hub::publish_from_afar(const std::string& name, std::uint32_t checksum, Clock::time_point now) {
-    const auto publisher = publish(
-        name, [] {}, now);
-    if (!publisher) return publisher;
-    const auto [found, first] = streams_.try_emplace(name);
-    auto& stream = found->second;
-    if (first) {
-        stream.number = next_stream_++;
-        stream.broadcast = Broadcast(limits_.broadcast);
+    if (!has_place_for(name)) {
+        ++counters_.refused_publishers_limit;
+        return fail(ErrorKind::limit, too_many_streams);
     }
+    const auto publisher = connect(
+        name, [] {}, now);
+    auto& stream = stream_named(name);
     replace_publisher(stream, checksum);
-    stream.connection = publisher->connection;
+    stream.connection = publisher.connection;
     stream.alive_afar = false;
     stream.viewers_afar = 0;
-    auto& connection = connections_.at(publisher->connection);
+    auto& connection = connections_.at(publisher.connection);
     connection.far = connection.admitted = true;
-    tell_from_afar(*publisher, false, checksum, now);
+    tell_from_afar(publisher, false, checksum, now);
     return publisher;
 }
 
@@ -249,32 +277,76 @@ void Hub::begin_session(const std::string& name, Stream& stream, const PacketHea
 }
 
 // It counts as memory as long as anybody holds it, which may be longer than the hub.
-std::shared_ptr<LivePacket> Hub::counted(LivePacket packet) const {
+std::shared_ptr<LivePacket> Hub::counted(LivePacket packet, const HubMemory::SharedShare& share) {
     const auto bytes = packet.bytes.size();
-    *memory_ += bytes;
-    return {new LivePacket(std::move(packet)), [memory = memory_, bytes](const LivePacket* held) {
-                *memory -= bytes;
+    share->take(bytes);
+    return {new LivePacket(std::move(packet)), [share, bytes](const LivePacket* held) {
+                share->give_back(bytes);
                 delete held;
             }};
 }
 
+// Whether the share may take so much more, if need be once those that hold more have given way.
+bool Hub::make_room(const HubMemory::Share& share, std::size_t bytes, Clock::time_point now) {
+    auto room = memory_.room_for(share, bytes, now);
+    for (; room == HubMemory::Room::after_another_gave_way; room = memory_.room_for(share, bytes, now))
+        give_way(*memory_.largest(now), now);
+    return room == HubMemory::Room::there;
+}
+
+// Whatever holds memory under this name gives it back: an unfinished message, what is kept for those who may join, and
+// what viewers have yet to take. Who publishes whole packets stays, and so do viewers who keep up.
+void Hub::give_way(HubMemory::Share& share, Clock::time_point now) {
+    memory_.gives_way(share, now);
+    ++counters_.gave_way;
+    const auto& name = share.stream();
+    tell({.name = "gave_way",
+          .text = "the hub's memory for packets is used up, and this stream, which holds most, gives way",
+          .stream = name,
+          .numbers = {{"bytes", static_cast<std::int64_t>(share.bytes())}},
+          .warning = true});
+    for (auto& [number, connection] : connections_) {
+        if (connection.stream != name || connection.part.bytes == 0 || connection.closing) continue;
+        ++counters_.refused_publishers_limit;
+        detach(connection, "the hub has no memory for it", now);
+        static_cast<void>(refuse(connection, {ErrorKind::limit, memory_used_up}, CloseCode::try_later));
+    }
+    const auto empty = [&](Stream& stream) {
+        stream.broadcast.drop_kept();
+        for (auto& [viewer, watching] : stream.watching) {
+            const bool holds = watching.writing || stream.broadcast.waiting_bytes(viewer) > 0;
+            if (!holds || watching.closing) continue;
+            watching.closing = Closing{CloseCode::try_later, memory_used_up, true};
+            watching.wake();
+        }
+    };
+    if (const auto found = streams_.find(name); found != streams_.end()) empty(found->second);
+    for (auto& [number, stream] : ended_)
+        if (stream.share.get() == &share) empty(stream);
+}
+
 // False if there is no memory for so much.
-bool Hub::hold(PartOfMessage& part, std::size_t bytes, Clock::time_point now) {
+bool Hub::hold(PartOfMessage& part, HubMemory::Share& share, std::size_t bytes, Clock::time_point now) {
     if (part.bytes == 0) part.since = now;
-    *memory_ += bytes;
-    *memory_ -= std::exchange(part.bytes, bytes);
-    return has_memory_for(0);
+    share.take(bytes);
+    share.give_back(std::exchange(part.bytes, bytes));
+    return make_room(share, 0, now);
 }
 
 // The message is whole, or nothing more of it will come.
-void Hub::drop(PartOfMessage& part) { *memory_ -= std::exchange(part.bytes, 0); }
+void Hub::drop(PartOfMessage& part, HubMemory::Share& share) { share.give_back(std::exchange(part.bytes, 0)); }
 
 Result<void> Hub::receive_part(Publisher publisher, std::size_t bytes, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
     if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
     auto& connection = found->second;
     heard(publisher, now);
-    if (hold(connection.part, bytes, now)) return {};
+    if (!connection.admitted && bytes > limits_.first_message_bytes) {
+        ++counters_.refused_publishers_message;
+        return refuse(connection, {ErrorKind::bad_input, "the first message is too large for a sequence header"},
+                      CloseCode::too_large);
+    }
+    if (hold(connection.part, *connection.share, bytes, now)) return {};
     ++counters_.refused_publishers_limit;
     detach(connection, "the hub has no memory for it", now);
     return refuse(connection, {ErrorKind::limit, memory_used_up}, CloseCode::try_later);
@@ -285,7 +357,7 @@ Result<void> Hub::receive_packet(Publisher publisher, std::vector<std::uint8_t> 
     if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
     auto& connection = found->second;
     connection.heard = now;
-    drop(connection.part);
+    drop(connection.part, *connection.share);
     auto header = header_of(message, limits_.packet_bytes);
     if (!connection.admitted) {
         if (!header) {
@@ -301,7 +373,7 @@ Result<void> Hub::receive_packet(Publisher publisher, std::vector<std::uint8_t> 
         ++counters_.damaged_messages;
         return {};
     }
-    if (!has_memory_for(message.size())) {
+    if (!make_room(*stream.share, message.size(), now)) {
         ++counters_.dropped_for_memory;
         // Without its header nothing of the stream can be shown.
         if (header->kind == PacketKind::sequence) {
@@ -318,7 +390,7 @@ Result<void> Hub::receive_packet(Publisher publisher, std::vector<std::uint8_t> 
     stream.counters.bytes += message.size();
     counters_.bytes_in += message.size();
     if (header->kind == PacketKind::sequence) begin_session(connection.stream, stream, *header, message);
-    auto packet = counted({*header, std::move(message), {}});
+    auto packet = counted({*header, std::move(message), {}}, stream.share);
     const bool frame = packet->is_frame();
     stream.has_frames = stream.has_frames || frame;
     if (frame && stream.stamp) {
@@ -348,7 +420,7 @@ Result<void> Hub::receive_text(Publisher publisher, std::string_view text, Clock
     const auto found = connections_.find(publisher.connection);
     if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
     auto& connection = found->second;
-    drop(connection.part);
+    drop(connection.part, *connection.share);
     const auto message = read_from_publisher(text);
     const auto refusal = text_refused(text, message, connection.allowance, now);
     if (!refusal) {
@@ -360,11 +432,22 @@ Result<void> Hub::receive_text(Publisher publisher, std::string_view text, Clock
     return refuse(connection, {ErrorKind::bad_input, refusal->reason}, *refusal->code);
 }
 
+Result<void> Hub::receive_nothing(Publisher publisher, Clock::time_point now) {
+    const auto found = connections_.find(publisher.connection);
+    if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
+    auto& connection = found->second;
+    if (connection.allowance.allow(now)) return {};
+    ++counters_.refused_publishers_message;
+    detach(connection, "the publisher sent too much that carries nothing", now);
+    return refuse(connection, {ErrorKind::bad_input, too_much_of_nothing}, CloseCode::refused);
+}
+
 void Hub::receive_text(Publisher publisher, const FromPublisher& message, Clock::time_point now) {
     heard(publisher, now);
     const auto found = connections_.find(publisher.connection);
     auto* stream = found == connections_.end() ? nullptr : published_by(found->second);
     if (!stream) return;
+    found->second.ends_stream = found->second.ends_stream || std::holds_alternative<EndOfStream>(message);
     if (const auto* heartbeat = std::get_if<HeartbeatFromPublisher>(&message)) {
         stream->last_heartbeat = now;
         if (heartbeat->clock) stream->clock.tell(*heartbeat->clock, now);
@@ -421,11 +504,12 @@ void Hub::leave(Publisher publisher, bool ended_stream, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
     if (found == connections_.end()) return;
     const bool published = found->second.admitted;
+    const bool ends = ended_stream || found->second.ends_stream;
     const auto name = found->second.stream;
-    drop(found->second.part);
+    drop(found->second.part, *found->second.share);
     detach(found->second, "the publisher's connection ended", now);
     connections_.erase(found);
-    if (published && ended_stream) end_stream(streams_.find(name), "the publisher ended the stream");
+    if (published && ends) end_stream(streams_.find(name), "the publisher ended the stream");
 }
 
 // Passed on at once, or by tick() once a second has passed since the last one; unless such a frame came meanwhile.
@@ -460,10 +544,6 @@ Result<Hub::Viewer> Hub::watch(const std::string& name, std::function<void()> wa
         ++counters_.refused_viewers_limit;
         return fail(ErrorKind::limit, "'" + name + "' has as many viewers as this hub serves");
     }
-    if (!has_memory_for(1)) {
-        ++counters_.refused_viewers_limit;
-        return fail(ErrorKind::limit, memory_used_up);
-    }
     ++counters_.joined;
     const auto viewer = stream.broadcast.join(wake, now);
     // Heartbeats of many who came at once are spread over the second.
@@ -497,8 +577,8 @@ Hub::Watching* Hub::watching(const Viewer& viewer) {
 void Hub::leave(const Viewer& viewer) {
     auto* watching = this->watching(viewer);
     if (!watching) return;
-    drop(watching->part);
     auto& stream = *stream_of(viewer);
+    drop(watching->part, *stream.share);
     const auto& counters = stream.broadcast.counters(viewer.viewer);
     counters_.dropped_frames += counters.dropped_frames;
     counters_.fallen_behind += counters.fallen_behind;
@@ -511,7 +591,7 @@ void Hub::leave(const Viewer& viewer) {
 Result<void> Hub::receive_part(const Viewer& viewer, std::size_t bytes, Clock::time_point now) {
     auto* watching = this->watching(viewer);
     if (!watching || watching->closing) return fail(ErrorKind::bad_input, connection_ended);
-    if (hold(watching->part, bytes, now)) return {};
+    if (hold(watching->part, *stream_of(viewer)->share, bytes, now)) return {};
     ++counters_.refused_viewers_limit;
     watching->closing = Closing{CloseCode::try_later, memory_used_up};
     watching->wake();
@@ -521,7 +601,7 @@ Result<void> Hub::receive_part(const Viewer& viewer, std::size_t bytes, Clock::t
 Result<void> Hub::receive_text(const Viewer& viewer, std::string_view text, Clock::time_point now) {
     auto* watching = this->watching(viewer);
     if (!watching || watching->closing) return fail(ErrorKind::bad_input, connection_ended);
-    drop(watching->part);
+    drop(watching->part, *stream_of(viewer)->share);
     const auto message = read_from_viewer(text);
     const auto refusal = text_refused(text, message, watching->allowance, now);
     if (!refusal) {
@@ -534,9 +614,20 @@ Result<void> Hub::receive_text(const Viewer& viewer, std::string_view text, Cloc
     return fail(ErrorKind::bad_input, refusal->reason);
 }
 
+Result<void> Hub::receive_nothing(const Viewer& viewer, Clock::time_point now) {
+    auto* watching = this->watching(viewer);
+    if (!watching || watching->closing) return fail(ErrorKind::bad_input, connection_ended);
+    if (watching->allowance.allow(now)) return {};
+    ++counters_.refused_viewers_message;
+    watching->closing = Closing{CloseCode::refused, too_much_of_nothing};
+    watching->wake();
+    return fail(ErrorKind::bad_input, too_much_of_nothing);
+}
+
 ForViewer Hub::next(const Viewer& viewer, Clock::time_point now) {
     auto* watching = this->watching(viewer);
     if (!watching) return Closing{};
+    watching->writing = false;
     if (watching->closing) return *watching->closing;
     auto& stream = *stream_of(viewer);
     const bool texts = watching->options.texts;
@@ -555,17 +646,24 @@ ForViewer Hub::next(const Viewer& viewer, Clock::time_point now) {
         packet = stream.broadcast.next(viewer.viewer);
         if (packet && packet->stamp && watching->options.stamps) {
             watching->behind_stamp = packet;
+            watching->writing = true;
             return *packet->stamp;
         }
     }
     if (packet) {
         ++counters_.packets_out;
         counters_.bytes_out += packet->bytes.size();
+        watching->writing = true;
         return packet;
     }
     if (!stream.ended) return {};
     if (std::exchange(watching->gone, false) && texts) return Gone{stream.gone};
     return Closing{CloseCode::ended, stream.gone};
+}
+
+bool Hub::ends_at_once(const Viewer& viewer) {
+    const auto* watching = this->watching(viewer);
+    return watching && watching->closing && (watching->closing->at_once || !watching->closing->code);
 }
 
 void Hub::tell_gone(Stream& stream, const std::string& reason) {
@@ -634,6 +732,7 @@ void Hub::tick(Clock::time_point now) {
         if (!stream.connection && now - stream.heard > limits_.remembered_without_publisher)
             end_stream(found, "the stream has ended");
     }
+    memory_.forget_unused();
 }
 
 void Hub::close_all(CloseCode code, const std::string& reason) {
@@ -690,7 +789,7 @@ std::optional<StreamInfo> Hub::stream(const std::string& name, Clock::time_point
 
 HubCounters Hub::counters() const {
     auto out = counters_;
-    out.memory = *memory_;
+    out.memory = memory_.bytes();
     const auto add = [&](const Stream& stream) {
         for (const auto& [viewer, watching] : stream.watching) {
             out.dropped_frames += stream.broadcast.counters(viewer).dropped_frames;

@@ -10,7 +10,6 @@
 // waits in a queue, and they come before packets that wait.
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -29,20 +28,24 @@
 #include "live/client/broadcast.h"
 #include "live/client/control.h"
 #include "live/hub/event.h"
+#include "live/hub/hub_memory.h"
 
 namespace htvm::live {
 
 struct HubLimits {
     BroadcastLimits broadcast{};
     std::size_t streams = 256;
-    std::size_t viewers = 4096;                        // of one stream
-    std::size_t packet_bytes = std::size_t{16} << 20;  // of one packet
+    std::size_t viewers = 4096;                              // of one stream
+    std::size_t packet_bytes = std::size_t{16} << 20;        // of one packet
+    std::size_t first_message_bytes = std::size_t{1} << 20;  // of the first: a sequence header has 0.3 MiB at most
     // All packets together, each counted once: kept for those who may join, waiting for viewers, and those that
-    // have come in part. Beyond it nobody new is let in, and what publishers send is dropped.
+    // have come in part. Beyond it the stream that holds most gives way: who publishes it is refused what needs more,
+    // and where it is others that need it, loses what waits and is kept.
     std::size_t memory = std::size_t{1} << 30;
-    std::chrono::milliseconds message_time{30000};      // from a message's first part to its last
-    std::chrono::milliseconds silence{2000};            // after which another session may take a stream over
-    std::chrono::milliseconds publisher_silence{3000};  // after which its connection is ended
+    std::size_t stream_memory = std::size_t{256} << 20;  // of that, of one stream; beyond it what it sends is dropped
+    std::chrono::milliseconds message_time{30000};       // from a message's first part to its last
+    std::chrono::milliseconds silence{2000};             // after which another session may take a stream over
+    std::chrono::milliseconds publisher_silence{3000};   // after which its connection is ended
     std::chrono::milliseconds remembered_without_publisher{10000};  // then the stream is gone
     std::chrono::milliseconds heartbeat{1000};                      // from one to the next
     std::chrono::milliseconds key_frame{1000};  // at least, from one request to a publisher to the next
@@ -91,7 +94,8 @@ struct HubCounters {
     std::uint64_t refused_viewers_no_stream = 0, refused_viewers_limit = 0, refused_viewers_message = 0;
     std::uint64_t slow_publishers = 0, slow_viewers = 0;  // whose messages took too long; so their connections ended
     std::uint64_t silent_publishers = 0;                  // whose connections were ended
-    std::uint64_t dropped_for_memory = 0;                 // packets that came when HubLimits::memory was used up
+    std::uint64_t dropped_for_memory = 0;                 // packets for which HubLimits leave no memory
+    std::uint64_t gave_way = 0;                           // how often a stream did, since others needed its memory
     std::uint64_t joined = 0;                             // viewers who were let in
     std::size_t memory = 0;                               // of all packets, those included that have come in part, now
 };
@@ -126,6 +130,7 @@ private:
 struct Closing {
     std::optional<CloseCode> code;  // none: the line is dead; nothing can be said
     std::string reason{};
+    bool at_once = false;  // even if the other side has yet to take what is being written
 };
 
 // What to write to a connection next; monostate: nothing for now. After Closing nothing comes.
@@ -160,10 +165,12 @@ public:
         Broadcast::Viewer viewer = 0;
     };
 
-    explicit Hub(const HubLimits& limits = {}, Log log = {}) : limits_(limits), log_(std::move(log)) {}
+    explicit Hub(const HubLimits& limits = {}, Log log = {})
+        : limits_(limits), log_(std::move(log)), memory_(limits.memory, limits.stream_memory) {}
 
     // A connection that wants to publish under this name. wake: called when there is something for it to be written
-    // after there was nothing. limit: there are too many streams.
+    // after there was nothing. limit: there are too many streams. One that has not yet sent its first packet gives way
+    // to a newer one of the same name.
     Result<Publisher> publish(const std::string& name, std::function<void()> wake, Clock::time_point now);
     // The publisher's next message: one packet. A damaged one is counted and left out. An error ends the connection,
     // which next() says too: the first packet is no sequence header, the stream belongs to another session that was
@@ -176,11 +183,13 @@ public:
     // A part of a message came, which takes so many bytes of memory by now, until it is whole:
     // receive_packet() or receive_text(). An error ends the connection: there is no memory for it.
     Result<void> receive_part(Publisher publisher, std::size_t bytes, Clock::time_point now);
+    // What carries nothing, such as a ping, counts as a text message; an error if it is one of too many.
+    Result<void> receive_nothing(Publisher publisher, Clock::time_point now);
     // The line is alive.
     void heard(Publisher publisher, Clock::time_point now);
     ForPublisher next(Publisher publisher);
-    // The connection ended. ended_stream: the publisher said that the stream ended with it; its viewers are sent what
-    // waits for them, and their connections end. Otherwise it may come back.
+    // The connection ended. ended_stream: and so did the stream, as it does too where the publisher said so
+    // (EndOfStream); its viewers are sent what waits for them, and their connections end. Otherwise it may come back.
     void leave(Publisher publisher, bool ended_stream, Clock::time_point now);
 
     // A stream whose publisher is connected to another hub (live/hub/hub_peering.h): it is listed and watched as those
@@ -210,7 +219,10 @@ public:
     Result<void> receive_part(const Viewer& viewer, std::size_t bytes, Clock::time_point now);
     // A text message; an error ends the connection.
     Result<void> receive_text(const Viewer& viewer, std::string_view text, Clock::time_point now);
+    Result<void> receive_nothing(const Viewer& viewer, Clock::time_point now);
     ForViewer next(const Viewer& viewer, Clock::time_point now);
+    // Whether the connection ends without waiting for what is being written; wake is called when it comes to that.
+    bool ends_at_once(const Viewer& viewer);
     void leave(const Viewer& viewer);
 
     // Heartbeats, silent publishers, and the end of streams that have been without a publisher for too long; to be
@@ -247,6 +259,7 @@ private:
         WatchOptions options;
         TextAllowance allowance;
         bool hello = true, heartbeat = false, gone = false;  // to be written
+        bool writing = false;                                // what next() gave
         PartOfMessage part{};
         Clock::time_point heartbeat_at{};  // the next one
         SharedPacket behind_stamp{};       // its stamp was written
@@ -255,6 +268,7 @@ private:
     struct Stream {
         std::uint64_t number = 0;
         Broadcast broadcast;
+        HubMemory::SharedShare share;
         std::optional<std::uint64_t> connection;  // of the publisher, one of connections_, if it was admitted
         bool alive_afar = false;                  // of a publisher on another hub: whether it is connected there
         std::size_t viewers_afar = 0;
@@ -275,20 +289,26 @@ private:
     };
     struct Connection {
         std::string stream;
+        HubMemory::SharedShare share;
         std::function<void()> wake;
         TextAllowance allowance;
         Clock::time_point heard{};
         PartOfMessage part{};
         bool far = false;  // to another hub
         bool admitted = false;
+        bool ends_stream = false;                                 // as the publisher said
         bool hello = true, heartbeat = false, key_frame = false;  // to be written
         Clock::time_point heartbeat_at{};
         std::optional<Closing> closing{};
     };
-    std::shared_ptr<LivePacket> counted(LivePacket packet) const;
-    bool has_memory_for(std::size_t bytes) const { return *memory_ + bytes <= limits_.memory; }
-    bool hold(PartOfMessage& part, std::size_t bytes, Clock::time_point now);
-    void drop(PartOfMessage& part);
+    static std::shared_ptr<LivePacket> counted(LivePacket packet, const HubMemory::SharedShare& share);
+    bool make_room(const HubMemory::Share& share, std::size_t bytes, Clock::time_point now);
+    void give_way(HubMemory::Share& share, Clock::time_point now);
+    bool hold(PartOfMessage& part, HubMemory::Share& share, std::size_t bytes, Clock::time_point now);
+    static void drop(PartOfMessage& part, HubMemory::Share& share);
+    bool has_place_for(const std::string& name) const;
+    Publisher connect(const std::string& name, std::function<void()> wake, Clock::time_point now);
+    Stream& stream_named(const std::string& name);
     Stream* stream_of(const Viewer& viewer);
     Watching* watching(const Viewer& viewer);
     Stream* published_by(const Connection& connection);
@@ -309,9 +329,7 @@ private:
 
     HubLimits limits_;
     Log log_;
-    // Bytes of packets, wherever they are held, and of what has come of others; the last to hold a packet may be a
-    // recording, on its thread.
-    std::shared_ptr<std::atomic<std::size_t>> memory_ = std::make_shared<std::atomic<std::size_t>>(0);
+    HubMemory memory_;
     std::map<std::string, Stream> streams_;
     std::map<std::uint64_t, Stream> ended_;  // by number: until their last viewers have been sent what waits
     std::map<std::uint64_t, Connection> connections_;

@@ -18,7 +18,49 @@ net::ip::address counted_address(const net::ip::address& address) {
     return net::ip::address_v6(bytes);
 }
 
+std::string in_lower_case(std::string_view text) {
+    std::string out(text);
+    for (auto& c : out)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return out;
+}
+
+std::string_view host_without_port(std::string_view host) {
+    const auto colon = host.rfind(':');
+    return colon == std::string_view::npos || host.find(']', colon) != std::string_view::npos ? host
+                                                                                              : host.substr(0, colon);
+}
+
+bool same_host(std::string_view a, std::string_view b) { return in_lower_case(a) == in_lower_case(b); }
+
+// Sites are the same whatever the case of their letters, and with the port that their scheme has anyway or without.
+std::string normal_origin(std::string_view origin) {
+    auto out = in_lower_case(origin);
+    for (const auto& [scheme, port] : {std::pair("http://", ":80"), std::pair("https://", ":443")})
+        if (out.starts_with(scheme) && out.ends_with(port)) out.resize(out.size() - std::string_view(port).size());
+    return out;
+}
+
+bool is_one_of(const std::vector<std::string>& origins, std::string_view origin) {
+    const auto same = [wanted = normal_origin(origin)](const auto& one) { return normal_origin(one) == wanted; };
+    return std::any_of(origins.begin(), origins.end(), same);
+}
+
+// Whether it is the site that a request with this Host is for. Only the origin tells the scheme.
+bool names_origin(std::string_view origin, std::string_view host) {
+    const auto name = host_of_origin(origin);
+    if (name.empty()) return false;
+    const std::string scheme(origin.substr(0, origin.size() - name.size()));
+    return normal_origin(origin) == normal_origin(scheme + std::string(host));
+}
+
 }  // namespace
+
+bool is_loopback(const std::string& address) {
+    boost::system::error_code error;
+    const auto parsed = net::ip::make_address(address, error);
+    return !error && counted_address(parsed).is_loopback();
+}
 
 Result<Credentials> read_credentials(const AdmissionOptions& options) {
     Credentials out;
@@ -67,15 +109,19 @@ bool Admission::names_loopback(std::string_view host) const {
 
 // A page of another site whose name was made to point here (DNS rebinding) sends that name.
 bool Admission::host_allowed(const Request& request) const {
-    return !options_.loopback_names || names_loopback(request[http::field::host]);
+    if (!options_.loopback_names && options_.hosts.empty()) return true;
+    const auto host = request[http::field::host];
+    if (names_loopback(host)) return true;
+    const auto named = [&](const std::string& name) { return same_host(host_without_port(host), name); };
+    return std::any_of(options_.hosts.begin(), options_.hosts.end(), named);
 }
 
 // Whether a page, if it is one that asks, may do so; other programs name no origin.
 bool Admission::origin_allowed(const Request& request) const {
     const auto origin = request[http::field::origin];
-    if (origin.empty() || host_of_origin(origin) == request[http::field::host]) return true;
+    if (origin.empty() || names_origin(origin, request[http::field::host])) return true;
     if (options_.origins.empty()) return options_.other_sites;
-    return std::find(options_.origins.begin(), options_.origins.end(), origin) != options_.origins.end();
+    return is_one_of(options_.origins, origin);
 }
 
 // Whether it comes from a program on this machine. A web page in a browser here is somebody else, and so is who comes
@@ -149,8 +195,7 @@ void Admission::let_others_read(const Request& request, ResponseHeader& header) 
     }
     header.set(http::field::vary, "Origin");
     const auto origin = request[http::field::origin];
-    if (std::find(options_.origins.begin(), options_.origins.end(), origin) != options_.origins.end())
-        header.set(http::field::access_control_allow_origin, origin);
+    if (is_one_of(options_.origins, origin)) header.set(http::field::access_control_allow_origin, origin);
 }
 
 }  // namespace htvm::live

@@ -24,8 +24,11 @@ namespace htvm::live {
 struct AdmissionOptions {
     bool other_sites = false;            // whether pages of any other site may read the streams (CORS, WebSockets),
     std::vector<std::string> origins{};  // or, if there are any, those of these sites alone: "https://a.example"
-    bool loopback_names = false;         // refuse requests whose Host is not this machine's loopback address
-    unsigned connections = 512;          // at once; more are closed
+    // Requests must be for one of these hosts, or this machine's loopback address: a page of another site could have
+    // its own name lead here. Empty, and loopback_names false: for any.
+    std::vector<std::string> hosts{};  // "hub.example", of any port
+    bool loopback_names = false;
+    unsigned connections = 512;  // at once; more are closed
     unsigned connections_per_address = 64;
     unsigned viewers_per_address = 64;      // of live streams
     std::chrono::seconds refusal_delay{1};  // for who publishes by a wrong token, so that many cannot be tried
@@ -34,6 +37,9 @@ struct AdmissionOptions {
     std::string publishers{};  // who may publish what; "": programs on this machine, anything
     std::string link_keys{};   // of links, without which nothing can be watched; "": anyone may watch
 };
+
+// Whether what listens on this address can be reached from this machine alone.
+bool is_loopback(const std::string& address);
 
 // What the files say.
 struct Credentials {

@@ -1,6 +1,10 @@
 #include "live/server/handlers.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <nlohmann/json.hpp>
@@ -70,7 +74,7 @@ std::string stream_list(const Hub& hub) {
     return json_text(list);
 }
 
-std::string metrics(const Site& site) {
+std::string metrics_of(const Site& site) {
     return metrics_text({.hub = site.hub,
                          .recorder = site.recorder,
                          .nats = site.nats ? std::optional(site.nats->counters()) : std::nullopt,
@@ -174,44 +178,67 @@ net::awaitable<void> watch(const Site& site, Line line, Request request, Route r
     }
 }
 
+// On a thread of its own, which leaves the processor to the server's.
+net::awaitable<std::string> walk(const ServedFiles& files) {
+    constexpr int yielding = 10;
+    ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), yielding);
+    co_return file_list(files);
+}
+
+// A thousandth of a second for every one that is asked for, at most: they are made 50 times a second.
+constexpr std::chrono::milliseconds between_texts{20}, between_walks{500};
+
 }  // namespace
 
-Response answer(const Site& site, const Route& route, const Request& request, const net::ip::address& address) {
+SharedTexts::SharedTexts(const Site& site, const net::any_io_executor& executor)
+    : streams(executor, between_texts,
+              [&site]() -> net::awaitable<std::string> { co_return site.hub ? stream_list(*site.hub) : "null"; }),
+      metrics(executor, between_texts, [&site]() -> net::awaitable<std::string> { co_return metrics_of(site); }),
+      files(executor, between_walks, [this, &site]() -> net::awaitable<std::string> {
+          return net::co_spawn(walker, walk(site.files), net::use_awaitable);
+      }) {}
+
+net::awaitable<Response> answer(const Site& site, const Route& route, const Request& request,
+                                const net::ip::address& address) {
+    SharedText::Text text;
     auto header = common_header(site);
     if (!site.admission.host_allowed(request))
-        return empty_response(http::status::misdirected_request, std::move(header));
+        co_return empty_response(http::status::misdirected_request, std::move(header));
     switch (route.handler) {
         case Handler::wrong_method:
             header.set(http::field::allow, "GET, HEAD");
-            return empty_response(http::status::method_not_allowed, std::move(header));
+            co_return empty_response(http::status::method_not_allowed, std::move(header));
         case Handler::bad_path:
-            return empty_response(http::status::bad_request, std::move(header));
+            co_return empty_response(http::status::bad_request, std::move(header));
         case Handler::page:
-            return answer_page(site, "index.html", request, std::move(header));
+            co_return answer_page(site, "index.html", request, std::move(header));
         case Handler::player_file:
-            return answer_page(site, route.name, request, std::move(header));
+            co_return answer_page(site, route.name, request, std::move(header));
         case Handler::file:
-            return answer_file(site, route.path, request, std::move(header));
+            co_return answer_file(site, route.path, request, std::move(header));
         case Handler::file_list:
             if (const auto refusal = site.admission.refuse_lists())
-                return refusing_response(*refusal, std::move(header));
-            return text_response(file_list(site.files), json_type, std::move(header));
+                co_return refusing_response(*refusal, std::move(header));
+            text = co_await site.texts->files.fresh();
+            co_return text_response(std::move(text), json_type, std::move(header));
         case Handler::stream_list:
             if (const auto refusal = site.admission.refuse_lists())
-                return refusing_response(*refusal, std::move(header));
-            return text_response(site.hub ? stream_list(*site.hub) : "null", json_type, std::move(header));
+                co_return refusing_response(*refusal, std::move(header));
+            text = co_await site.texts->streams.fresh();
+            co_return text_response(std::move(text), json_type, std::move(header));
         case Handler::health:
-            return answer_health(site, std::move(header));
+            co_return answer_health(site, std::move(header));
         case Handler::metrics:
             if (!site.admission.may_read_metrics(request, address))
-                return empty_response(http::status::forbidden, std::move(header));
-            return text_response(metrics(site), metrics_type, std::move(header));
+                co_return empty_response(http::status::forbidden, std::move(header));
+            text = co_await site.texts->metrics.fresh();
+            co_return text_response(std::move(text), metrics_type, std::move(header));
         case Handler::publish:
         case Handler::watch:  // carry() does
         case Handler::nothing:
             break;
     }
-    return empty_response(http::status::not_found, std::move(header));
+    co_return empty_response(http::status::not_found, std::move(header));
 }
 
 net::awaitable<void> carry(const Site& site, Line line, Request request, Route route, net::ip::address address) {

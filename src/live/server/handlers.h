@@ -4,6 +4,7 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/address.hpp>
+#include <boost/asio/thread_pool.hpp>
 #include <chrono>
 
 #include "live/client/line.h"
@@ -17,8 +18,18 @@
 #include "live/server/response.h"
 #include "live/server/routing.h"
 #include "live/server/served_files.h"
+#include "live/server/shared_text.h"
 
 namespace htvm::live {
+
+struct Site;
+
+// The texts that take work and that anybody may ask for, of a site. They must live until every answer has come.
+struct SharedTexts {
+    SharedText streams, metrics, files;
+    boost::asio::thread_pool walker{1};  // of the folder of files: it ends first
+    SharedTexts(const Site& site, const boost::asio::any_io_executor& executor);
+};
 
 // What the handlers answer from. They change nothing of it but what is called: admission, refusals and the hub.
 struct Site {
@@ -29,13 +40,15 @@ struct Site {
     Hub* hub = nullptr;                  // null: there are no live streams
     const Recorder* recorder = nullptr;  // null: nothing is recorded
     const NatsPeering* nats = nullptr;   // null: the hub is joined with no others
+    SharedTexts* texts = nullptr;        // never null once somebody asks
     std::chrono::seconds stall_time{};   // for a client to take the next 64 KB of a response
     Hub::Clock::time_point started = Hub::Clock::now();
     bool ending = false;  // the server is
 };
 
 // The response to a request for which there is no live stream to be carried.
-Response answer(const Site& site, const Route& route, const Request& request, const boost::asio::ip::address& address);
+boost::asio::awaitable<Response> answer(const Site& site, const Route& route, const Request& request,
+                                        const boost::asio::ip::address& address);
 
 // Publishes or watches, or says why not; then the connection has ended. route: a live one.
 boost::asio::awaitable<void> carry(const Site& site, Line line, Request request, Route route,

@@ -45,13 +45,14 @@ net::awaitable<std::optional<HttpConnections::LiveRequest>> HttpConnections::ans
         const bool body = !parser.is_done();
         auto& request = parser.get();
         Response response;
-        if (body) {
+        const auto hosts = request.count(http::field::host);
+        if (body || hosts > 1 || (hosts == 0 && request.version() >= 11)) {
             response.header.result(http::status::bad_request);
         } else {
             auto route = route_of(request, site_.hub != nullptr);
             if (route.is_live() && site_.admission.host_allowed(request))
                 co_return LiveRequest{std::move(request), std::move(route)};
-            response = answer(site_, route, request, address);
+            response = co_await answer(site_, route, request, address);
         }
         const bool alive = request.keep_alive() && !body && !draining_;
         response.header.keep_alive(alive);

@@ -34,9 +34,9 @@ constexpr std::size_t piece_bytes = 65536;  // of a message that is being read
 
 // What a coroutine that writes waits for: that there is something to write, or the end.
 struct News {
-    net::steady_timer timer;                          // cancelled when there is
-    bool ended = false;                               // the connection is of no use any more
-    std::optional<websocket::close_reason> theirs{};  // if the other side closed it
+    net::steady_timer timer;  // cancelled when there is
+    bool writing = false;     // until the other side has taken it
+    bool ended = false;       // the connection is of no use any more
     explicit News(const net::any_io_executor& executor) : timer(executor) {}
     net::awaitable<void> wait() {
         timer.expires_at(std::chrono::steady_clock::time_point::max());
@@ -73,10 +73,18 @@ net::awaitable<void> close(Connection& connection, CloseCode code, const std::st
 }
 
 // Reads messages until the connection ends, or one of these says that it should: receive_part(bytes), which is called
-// for each piece with the memory that the message takes by then, and receive(text, message).
-template <class ReceivePart, class Receive>
-net::awaitable<void> read_messages(SharedConnection connection, ReceivePart receive_part, Receive receive) {
+// for each piece with the memory that the message takes by then, and receive(text, message). receive_nothing(): called
+// for each ping and its like; whoever goes on with them after it said no is cut off.
+template <class ReceivePart, class Receive, class ReceiveNothing>
+net::awaitable<void> read_messages(SharedConnection connection, ReceivePart receive_part, Receive receive,
+                                   ReceiveNothing receive_nothing) {
     auto& socket = connection->socket;
+    constexpr int patience = 1000;
+    socket.control_callback(
+        [&socket, receive_nothing, refused = 0](websocket::frame_type kind, beast::string_view) mutable {
+            if (kind == websocket::frame_type::close || receive_nothing() || ++refused < patience) return;
+            beast::get_lowest_layer(socket).close();
+        });
     beast::flat_buffer buffer;
     for (bool wanted = true; wanted;) {
         buffer.clear();
@@ -88,7 +96,6 @@ net::awaitable<void> read_messages(SharedConnection connection, ReceivePart rece
             wanted = receive_part(buffer.capacity());
         } while (!failed && wanted && !socket.is_message_done() &&
                  !(socket.got_text() && buffer.size() > most_text_bytes));
-        if (failed == websocket::error::closed) connection->news.theirs = socket.reason();
         if (failed) {
             connection->news.ended = true;
             break;
@@ -106,7 +113,9 @@ std::string_view text_of(std::span<const std::uint8_t> bytes) {
 // One writer writes texts and packets, one after the other.
 net::awaitable<bool> write(Connection& connection, bool text, net::const_buffer message) {
     connection.socket.text(text);
+    connection.news.writing = true;
     const auto [error, bytes] = co_await connection.socket.async_write(message, awaited);
+    connection.news.writing = false;
     co_return !error;
 }
 
@@ -161,10 +170,7 @@ net::awaitable<void> publish_by_socket(Line line, Request request, std::string n
         co_await close(*connection, CloseCode::try_later, publisher.error().message);
         co_return;
     }
-    const Leave leave([&hub, &news, &publisher] {
-        const bool ended_stream = news.theirs && news.theirs->code == websocket::close_code::normal;
-        hub.leave(*publisher, ended_stream, Hub::Clock::now());
-    });
+    const Leave leave([&hub, &publisher] { hub.leave(*publisher, false, Hub::Clock::now()); });
     const auto receive_part = [&hub, number = *publisher](std::size_t bytes) {
         return hub.receive_part(number, bytes, Hub::Clock::now()).has_value();
     };
@@ -174,7 +180,11 @@ net::awaitable<void> publish_by_socket(Line line, Request request, std::string n
                      : hub.receive_packet(number, {message.begin(), message.end()}, now))
             .has_value();
     };
-    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive), net::detached);
+    const auto receive_nothing = [&hub, number = *publisher] {
+        return hub.receive_nothing(number, Hub::Clock::now()).has_value();
+    };
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive, receive_nothing),
+                  net::detached);
     co_await write_messages(*connection, [&] { return hub.next(*publisher); });
 }
 
@@ -184,12 +194,18 @@ net::awaitable<void> watch_by_socket(Line line, Request request, std::string nam
     if (!co_await accepted(*connection, request, most_text_bytes)) co_return;
     const WatchOptions options{.stamps = query_value(request.target(), "stamps").has_value()};
     auto& news = connection->news;
-    const auto viewer = hub.watch(
-        name, [&news] { news.timer.cancel(); }, options, Hub::Clock::now());
+    std::optional<Hub::Viewer> watching;
+    const auto wake = [&] {
+        news.timer.cancel();
+        if (news.writing && watching && hub.ends_at_once(*watching))
+            beast::get_lowest_layer(connection->socket).close();
+    };
+    const auto viewer = hub.watch(name, wake, options, Hub::Clock::now());
     if (!viewer) {
         co_await close(*connection, CloseCode::try_later, viewer.error().message);
         co_return;
     }
+    watching = *viewer;
     const Leave leave([&hub, &viewer] { hub.leave(*viewer); });
     const auto receive_part = [&hub, number = *viewer](std::size_t bytes) {
         return hub.receive_part(number, bytes, Hub::Clock::now()).has_value();
@@ -199,7 +215,11 @@ net::awaitable<void> watch_by_socket(Line line, Request request, std::string nam
         return hub.receive_text(number, text ? text_of(message) : R"({"type":"binary"})", Hub::Clock::now())
             .has_value();
     };
-    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive), net::detached);
+    const auto receive_nothing = [&hub, number = *viewer] {
+        return hub.receive_nothing(number, Hub::Clock::now()).has_value();
+    };
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive, receive_nothing),
+                  net::detached);
     co_await write_messages(*connection, [&] { return hub.next(*viewer, Hub::Clock::now()); });
 }
 
@@ -211,8 +231,13 @@ net::awaitable<void> refuse_socket(Line line, Request request, CloseCode code, s
 net::awaitable<void> watch_by_body(Line& line, ResponseHeader header, std::string name, Hub& hub) {
     keep_kernel_buffers_small(line);
     News news(line.get_executor());
-    const auto viewer = hub.watch(
-        name, [&news] { news.timer.cancel(); }, {.texts = false}, Hub::Clock::now());
+    std::optional<Hub::Viewer> watching;
+    const auto wake = [&] {
+        news.timer.cancel();
+        if (news.writing && watching && hub.ends_at_once(*watching)) line.next_layer().close();
+    };
+    const auto viewer = hub.watch(name, wake, {.texts = false}, Hub::Clock::now());
+    if (viewer) watching = *viewer;
     const Leave leave([&hub, &viewer] {
         if (viewer) hub.leave(*viewer);
     });
@@ -241,8 +266,10 @@ net::awaitable<void> watch_by_body(Line& line, ResponseHeader header, std::strin
         }
         line.next_layer().expires_after(silence);
         const auto& bytes = (*packet)->bytes;
+        news.writing = true;
         const auto [error, written] =
             co_await net::async_write(line, http::make_chunk(net::const_buffer(bytes.data(), bytes.size())), awaited);
+        news.writing = false;
         if (error) co_return;
     }
     co_await net::async_write(line, http::make_chunk_last(), awaited);

@@ -81,6 +81,7 @@ void add_hub(Metrics& metrics, const Hub& hub, Hub::Clock::time_point now) {
                   std::uint64_t{total.memory});
     metrics.counter("dropped_packets_total", "From publishers, when the memory for packets was used up",
                     total.dropped_for_memory);
+    metrics.counter("gave_way_total", "How often a stream gave memory back that others needed", total.gave_way);
     metrics.counter("viewers_fallen_behind_total", "How often viewers were too slow", total.fallen_behind);
     metrics.counter("key_frame_requests_total", "Requests passed to publishers", total.key_frame_requests);
     metrics.counter("silent_publishers_total", "Publishers' connections that ended since nothing was heard",

@@ -44,6 +44,12 @@ Response text_response(std::string text, const char* type, ResponseHeader header
     return {.header = std::move(header), .own = std::move(text)};
 }
 
+Response text_response(SharedText::Text text, const char* type, ResponseHeader header) {
+    auto out = text_response(std::string(), type, std::move(header));
+    out.shared = std::move(text);
+    return out;
+}
+
 Response refusing_response(const Refusal& refusal, ResponseHeader header) {
     header.result(refusal.status);
     return text_response(refusal.why + '\n', "text/plain; charset=utf-8", std::move(header));
@@ -52,6 +58,7 @@ Response refusing_response(const Refusal& refusal, ResponseHeader header) {
 net::awaitable<bool> send(Line& line, Response& response, bool with_body, std::chrono::seconds stall_time) {
     auto& header = response.header;
     if (!response.own.empty()) response.content = response.own;
+    if (response.shared) response.content = *response.shared;
     const bool text = response.file.file.descriptor() < 0;
     const auto count = text ? response.content.size() : response.count;
     if (header.result() != http::status::not_modified) header.set(http::field::content_length, std::to_string(count));

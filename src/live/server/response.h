@@ -12,6 +12,7 @@
 #include "live/client/line.h"
 #include "live/server/refusals.h"
 #include "live/server/served_files.h"
+#include "live/server/shared_text.h"
 
 namespace htvm::live {
 
@@ -21,6 +22,7 @@ struct Response {
     ResponseHeader header;
     std::string own{};           // a text made for this response,
     std::string_view content{};  // or one that outlives it,
+    SharedText::Text shared{};   // or one that several have,
     ServedFile file{};           // or a part of a file
     std::uint64_t first = 0, count = 0;
 };
@@ -32,6 +34,7 @@ std::string_view media_type(std::string_view name);
 Response empty_response(boost::beast::http::status status, ResponseHeader header);
 // A text that is made anew for each response.
 Response text_response(std::string text, const char* type, ResponseHeader header);
+Response text_response(SharedText::Text text, const char* type, ResponseHeader header);
 // The sentence that says why.
 Response refusing_response(const Refusal& refusal, ResponseHeader header);
 

@@ -12,7 +12,8 @@
 namespace htvm::live {
 namespace {
 
-constexpr std::size_t most_entries = 10000;
+constexpr std::size_t most_files = 10000, most_entries = 100000;
+constexpr std::string_view stream_ending = ".htvm", picture_endings[] = {".png", ".jpg"};
 
 std::string tag_of(const struct stat& status) {
     char text[64];
@@ -74,19 +75,22 @@ Result<ServedFile> ServedFolder::file(std::span<const std::string> segments) con
     return ServedFile{std::move(at), static_cast<std::uint64_t>(status.st_size), tag_of(status)};
 }
 
-std::vector<FolderEntry> ServedFolder::files(const std::string& ending) const {
+std::vector<FolderEntry> ServedFolder::files(std::span<const std::string_view> endings) const {
     namespace fs = std::filesystem;
     std::vector<FolderEntry> out;
     std::error_code error;
+    std::size_t entries = 0;
     for (fs::recursive_directory_iterator it(path_, fs::directory_options::skip_permission_denied, error), end;
-         !error && it != end && out.size() < most_entries; it.increment(error)) {
+         !error && it != end && out.size() < most_files && entries < most_entries; it.increment(error)) {
+        ++entries;
         const auto name = it->path().filename().string();
         const bool link = it->is_symlink(error);
         if (name.starts_with('.') || link) {
             it.disable_recursion_pending();
             continue;
         }
-        if (!name.ends_with(ending) || !it->is_regular_file(error)) continue;
+        const auto ends = [&](std::string_view ending) { return name.ends_with(ending); };
+        if (std::none_of(endings.begin(), endings.end(), ends) || !it->is_regular_file(error)) continue;
         const auto size = it->file_size(error);
         if (!error) out.push_back({it->path().lexically_relative(path_).string(), size});
     }
@@ -110,7 +114,8 @@ Result<ServedFile> ServedFiles::file(std::span<const std::string> segments) cons
     for (const auto& segment : segments) path += (path.empty() ? "" : "/") + segment;
     for (const auto& [name, place] : named_)
         if (name == path) return file_at(place);
-    const bool watched = path.ends_with(".htvm") || path.ends_with(".png") || path.ends_with(".jpg");
+    const bool watched =
+        path.ends_with(stream_ending) || path.ends_with(picture_endings[0]) || path.ends_with(picture_endings[1]);
     return folder_ && watched ? folder_->file(segments) : fail(ErrorKind::bad_input, "not served");
 }
 
@@ -119,13 +124,15 @@ std::vector<ListedFile> ServedFiles::list() const {
     for (const auto& [name, path] : named_)
         if (const auto file = file_at(path)) out.push_back({name, file->size});
     if (!folder_) return out;
-    std::set<std::string> pictures;
-    for (const char* ending : {".png", ".jpg"})
-        for (const auto& picture : folder_->files(ending)) pictures.insert(picture.path);
-    constexpr std::string_view ending = ".htvm";
-    for (auto& [path, size] : folder_->files(".htvm")) {
+    const std::string_view endings[] = {stream_ending, picture_endings[0], picture_endings[1]};
+    const auto files = folder_->files(endings);
+    std::set<std::string_view> pictures;
+    for (const auto& file : files)
+        if (!file.path.ends_with(stream_ending)) pictures.insert(file.path);
+    for (const auto& [path, size] : files) {
+        if (!path.ends_with(stream_ending)) continue;
         ListedFile& stream = out.emplace_back(ListedFile{path, size});
-        const auto name = path.substr(0, path.size() - ending.size());
+        const auto name = path.substr(0, path.size() - stream_ending.size());
         for (const char* picture : {".jpg", ".png"})
             if (pictures.contains(name + picture)) stream.poster = name + picture;
     }

@@ -126,6 +126,7 @@ struct Server::State {
     net::io_context context{1};
     tcp::acceptor acceptor{context};
     std::optional<NatsPeering> nats;  // if the hub is joined with others
+    SharedTexts texts{site, context.get_executor()};
 
     explicit State(const ServerOptions& given)
         : options(given),
@@ -134,7 +135,9 @@ struct Server::State {
                .pages = player_pages(),
                .hub = options.hub,
                .recorder = options.recorder,
-               .stall_time = options.stall_time} {}
+               .stall_time = options.stall_time} {
+        site.texts = &texts;
+    }
 
     Result<void> read_access_files();
     void tell(const Event& event) const {

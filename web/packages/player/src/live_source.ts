@@ -44,6 +44,7 @@ const protocol = 'htvm.1';
 const silenceMs = 3000;
 const firstPauseMs = 100;
 const longestPauseMs = 3000;
+const lookAgainMs = 5000; // at most, from one look to the next whether a stream that has ended is there again
 const laterPauseMs = 1000; // at least, where the hub says that it is to be tried later
 const keyFrameEveryMs = 1000;
 const missingForMs = 30000; // a hub that has just started knows its streams once their publishers are back
@@ -107,6 +108,7 @@ export class LiveSource {
     #anyPackets = false; // of this connection
     #everPackets = false;
     #missingSince: number | null = null;
+    #over = false; // the stream has ended, and nothing has come since
     #send: ((text: string) => void) | null = null;
     #askedAt = -Infinity;
 
@@ -122,6 +124,7 @@ export class LiveSource {
         this.close();
         this.#pauseMs = firstPauseMs;
         this.#missingSince = null;
+        this.#over = false;
         this.#listener.link('connecting', '');
         this.#open();
     }
@@ -172,7 +175,7 @@ export class LiveSource {
             opened = true;
             this.#send = (text) => socket.send(text);
             this.#heard();
-            this.#listener.link('open', '');
+            this.#opened();
         };
         socket.onmessage = ({ data }: MessageEvent<ArrayBuffer | string>) => {
             this.#heard();
@@ -205,7 +208,7 @@ export class LiveSource {
             return this.#fail(new SourceError('refused', `The server does not give ${address}: it says ${status}.`));
         if (!response.ok) return this.#reconnect('');
         this.#heard();
-        this.#listener.link('open', '');
+        this.#opened();
         const reader = response.body!.getReader();
         for (;;) {
             const { done, value } = await reader.read();
@@ -224,6 +227,10 @@ export class LiveSource {
             this.#anyPackets = this.#everPackets = true;
             this.#missingSince = null;
             this.#pauseMs = firstPauseMs;
+            if (this.#over) {
+                this.#over = false;
+                this.#opened();
+            }
             this.#listener.packet({ ...packet, bytes: packet.bytes.slice() }, first);
             if (attempt !== this.#attempt) return;
         }
@@ -233,7 +240,7 @@ export class LiveSource {
         const message = readHubMessage(text);
         if (!message) return;
         if (message.type === 'hello') this.#learnHubs(message.hubs ?? []);
-        this.#listener.message(message);
+        if (!this.#over) this.#listener.message(message);
     }
 
     #learnHubs(hubs: string[]): void {
@@ -250,8 +257,9 @@ export class LiveSource {
     #closed(code: number, reason: string): void {
         switch (code) {
             case 1000:
-                this.close();
-                this.#listener.link('ended', reason);
+                if (!this.#over) this.#listener.link('ended', reason);
+                this.#over = true;
+                this.#reconnect(reason);
                 break;
             case 1008:
             case 1009:
@@ -272,19 +280,25 @@ export class LiveSource {
     #missing(error: SourceError): void {
         const now = this.#around.now();
         this.#missingSince ??= now;
-        if (this.#everPackets && now - this.#missingSince < missingForMs) this.#reconnect('');
+        if (this.#over || (this.#everPackets && now - this.#missingSince < missingForMs)) this.#reconnect('');
         else this.#fail(error);
     }
 
     #fail(error: SourceError): void {
         this.close();
-        this.#listener.failed(error);
+        if (!this.#over) this.#listener.failed(error);
+    }
+
+    // Of a stream that has ended nothing is said until something comes: whoever is restarted brings it back.
+    #opened(): void {
+        if (!this.#over) this.#listener.link('open', '');
     }
 
     #reconnect(reason: string): void {
         this.close();
         ++this.#next;
-        this.#listener.link('reconnecting', reason);
+        if (!this.#over) this.#listener.link('reconnecting', reason);
+        if (this.#over) this.#pauseMs = lookAgainMs;
         const pause = this.#pauseMs * (0.5 + this.#around.random() / 2);
         this.#pauseMs = Math.min(2 * this.#pauseMs, longestPauseMs);
         this.#stopTimer = this.#around.after(pause, () => this.#open());

@@ -59,6 +59,7 @@ export class Playback implements TimedPlayback {
     #url = '';
     #serial = 0;
     #endedSerial = -1;
+    #finished = false; // played to the end
     #room = leastFrames;
     #roomSetFor = 0;
     #failed = false;
@@ -312,6 +313,7 @@ export class Playback implements TimedPlayback {
 
     finish(): void {
         this.playing = false;
+        this.#finished = true;
         this.#listener.ended();
     }
 
@@ -395,6 +397,7 @@ export class Playback implements TimedPlayback {
                 this.heldBytes = report.heldBytes;
                 break;
             default:
+                if (report.type === 'link' && report.link === 'open' && this.ended) this.#goOn();
                 this.#timeline.report(report);
                 this.#listener.live(report);
         }
@@ -416,6 +419,13 @@ export class Playback implements TimedPlayback {
         this.#queue.arrived(frame);
         this.#timeline.arrived(frame);
         this.#listener.arrived(frame);
+    }
+
+    // A live stream that had ended is there again.
+    #goOn(): void {
+        this.#endedSerial = -1;
+        if (this.#finished) this.playing = true;
+        this.#finished = false;
     }
 
     #allArrived(): void {
