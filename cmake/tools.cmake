@@ -61,7 +61,7 @@ function(htvm_program_library name folder)
   # The work is in the libraries; optimising the options and tables would take a quarter of the whole build.
   target_compile_options(htvm_${name} PRIVATE $<IF:$<CONFIG:Debug>,-O0,-O1>)
 endfunction()
-htvm_program_library(command_line command_line htvm_core htvm_io htvm_images CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
+htvm_program_library(command_line command_line htvm_core htvm_io htvm_images htvm_metrics CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
 target_compile_definitions(htvm_command_line PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
 include(cmake/live.cmake)
 htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_sound htvm_texture htvm_texture_baking htvm_synth htvm_metrics htvm_live)

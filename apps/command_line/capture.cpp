@@ -10,12 +10,12 @@
 #include "command_line/headings.h"
 #include "command_line/subject_height.h"
 #include "command_line/terminal.h"
-#include "core/front.h"
 #include "io/recording.h"
 #include "io/skeleton_align.h"
 #include "io/skeleton_file.h"
 #include "io/skeleton_rate.h"
 #include "io/texture_colours.h"
+#include "metrics/front.h"
 #include "metrics/percentile.h"
 
 namespace htvm::app {

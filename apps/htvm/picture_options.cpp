@@ -11,7 +11,7 @@
 #include "command_line/capture.h"
 #include "command_line/choice.h"
 #include "command_line/terminal.h"
-#include "core/front.h"
+#include "metrics/front.h"
 #include "stream_file.h"
 
 namespace htvm::app {

@@ -16,7 +16,6 @@
 
 #include "command_line/capture_kind.h"
 #include "command_line/terminal.h"
-#include "core/front.h"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "htvm/picture_decoder.hpp"
@@ -25,6 +24,7 @@
 #include "io/recording.h"
 #include "io/sequence.h"
 #include "io/texture_colours.h"
+#include "metrics/front.h"
 #include "stream_file.h"
 #include "stream_seek.h"
 #include "texture_output.h"

@@ -3,7 +3,7 @@
 #include <numbers>
 #include <utility>
 
-#include "core/front.h"
+#include "metrics/front.h"
 #include "metrics/render.h"
 
 namespace htvm {

@@ -1,5 +1,5 @@
 // From where a subject is seen from the front.
-#include "core/front.h"
+#include "metrics/front.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "core/front.h"
+#include "metrics/front.h"
 
 #include <charconv>
 #include <cmath>
@@ -10,13 +10,11 @@
 namespace htvm {
 namespace {
 
-using internal::cross, internal::dot, internal::operator*, internal::operator+, internal::operator-;
-
 constexpr double degree = std::numbers::pi / 180;
 constexpr const char* front_key = "front";
 
 // Where the head is along a negative axis the right side stays, so the front is behind.
-std::pair<Vector3d, Vector3d> right_and_up(UpAxis up) {
+std::pair<Point3, Point3> right_and_up(UpAxis up) {
     switch (up) {
         case UpAxis::plus_x:
             return {{{0, 1, 0}}, {{1, 0, 0}}};
@@ -36,8 +34,8 @@ std::pair<Vector3d, Vector3d> right_and_up(UpAxis up) {
 }
 
 // Three numbers with blanks between them, and nothing else.
-std::optional<Vector3d> three_numbers(std::string_view text) {
-    Vector3d out{};
+std::optional<Point3> three_numbers(std::string_view text) {
+    Point3 out{};
     const char *at = text.data(), *end = at + text.size();
     for (double& number : out) {
         while (at != end && *at == ' ') ++at;
@@ -56,12 +54,12 @@ ViewAxes view_axes(UpAxis up) {
     return {right, head, cross(right, head)};
 }
 
-Vector3d direction_at(double azimuth, UpAxis up) {
+Point3 direction_at(double azimuth, UpAxis up) {
     const ViewAxes axes = view_axes(up);
     return axes.front * std::cos(azimuth * degree) + axes.right * std::sin(azimuth * degree);
 }
 
-std::optional<double> azimuth_of(const Vector3d& direction, UpAxis up) {
+std::optional<double> azimuth_of(const Point3& direction, UpAxis up) {
     const ViewAxes axes = view_axes(up);
     const double ahead = dot(direction, axes.front), aside = dot(direction, axes.right);
     constexpr double least = 0.1;  // of its length, level
@@ -69,7 +67,7 @@ std::optional<double> azimuth_of(const Vector3d& direction, UpAxis up) {
     return std::atan2(aside, ahead) / degree;
 }
 
-MetadataEntry front_entry(const Vector3d& direction) {
+MetadataEntry front_entry(const Point3& direction) {
     std::string text;
     for (const double number : direction) {
         // Four digits are a hundredth of a degree; 0.0 takes the sign off zeros.
@@ -81,7 +79,7 @@ MetadataEntry front_entry(const Vector3d& direction) {
     return {front_key, text};
 }
 
-std::optional<Vector3d> front_of(std::span<const MetadataEntry> metadata) {
+std::optional<Point3> front_of(std::span<const MetadataEntry> metadata) {
     for (const auto& [key, value] : metadata) {
         if (key != front_key) continue;
         const auto direction = three_numbers(value);
@@ -92,13 +90,13 @@ std::optional<Vector3d> front_of(std::span<const MetadataEntry> metadata) {
     return std::nullopt;
 }
 
-std::optional<Vector3d> facing_of(const Mesh& mesh) {
-    Vector3d sum{};
+std::optional<Point3> facing_of(const Mesh& mesh) {
+    Point3 sum{};
     double area = 0;
     for (const auto& t : mesh.triangles) {
-        const Vector3d a = internal::to_vector(mesh.positions[t[0]]), b = internal::to_vector(mesh.positions[t[1]]),
-                       c = internal::to_vector(mesh.positions[t[2]]);
-        const Vector3d normal = cross(b - a, c - a);
+        const Point3 a = to_point(mesh.positions[t[0]]), b = to_point(mesh.positions[t[1]]),
+                     c = to_point(mesh.positions[t[2]]);
+        const Point3 normal = cross(b - a, c - a);
         sum = sum + normal;
         area += std::sqrt(dot(normal, normal));
     }
