@@ -10,7 +10,8 @@ using enum Layer;
 constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
     {.type = FrameType::intra,
      .packet = PacketKind::intra,
-     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra, charts, presence, reason},
+     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra, charts, presence, reason, levels,
+                level_colours},
      .refers_to = RefersTo::nothing,
      .codebooks = false,
      .referred = true,

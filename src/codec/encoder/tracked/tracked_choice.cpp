@@ -88,7 +88,8 @@ bool may_be_renewed(const TrackedWork& work, const FrameSteps& steps, const Latt
     const auto& origin = work.reference->origin;
     const double ratio = static_cast<double>(steps.geometry) / origin.steps.geometry;
     const double most = work.configuration.tells_presence() ? numbers.most_grown : numbers.most_renewed_vertices;
-    return work.configuration.options.rate.target_error <= 0 &&
+    // The mesh that frames refer to is coarse where it has detail, which is not in it.
+    return work.reference->decoded.detail.empty() && work.configuration.options.rate.target_error <= 0 &&
            static_cast<double>(tracked.positions.size()) <= most * static_cast<double>(origin.vertices) &&
            ratio <= numbers.most_renewed_steps && ratio >= 1 / numbers.most_renewed_steps;
 }
