@@ -29,7 +29,7 @@ struct LevelColourModels {
     std::array<BinaryModel, contrasts * aboves> by_above{};
     std::array<BinaryModel, besides * aboves> by_both{};
     Mixer<3> nonzero_mixer{};
-    // Of each component.
+    // The residuals of each component.
     std::array<std::array<ResidualContext, contrasts>, 3> by_contrast{};
     std::array<std::array<ResidualContext, besides * 3>, 3> by_before{};
     std::array<ResidualMantissa, 3> mantissa{};

@@ -49,7 +49,7 @@ struct LeveledSurface {
     std::vector<Triangle> triangles;            // of the base
     std::vector<SubdivisionLevel> subdivision;  // its levels, the one that rounds off last
     std::vector<double> displacements;          // of each vertex, along its normal, in lattice units
-    // Of the level above one, of 1 to one more than there are.
+    // The triangles of the level above one, which is 1 to one more than there are.
     const std::vector<Triangle>& triangles_above(std::size_t level) const {
         return level < 2 ? triangles : subdivision[level - 2].triangles;
     }

@@ -25,7 +25,7 @@ SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions&
 
 // How far a triangle's surface passes off the middle of each of its sides, from one corner to the next.
 using Bulge = std::array<Vector3d, 3>;
-// Of each triangle of a moved reference that is shown with detail; nothing where there is none.
+// How each triangle of a moved reference bulges that is shown with detail; nothing where there is none.
 std::vector<Bulge> bulges_of(const SurfaceDetail& detail, std::span<const LatticePoint> moved,
                              std::span<const Triangle> triangles);
 
