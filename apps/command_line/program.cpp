@@ -75,7 +75,7 @@ std::string unknown_flag(const CLI::App& command) {
     return "";
 }
 
-// Of flags, those that begin with this one and a hyphen: --fill-holes of --fill.
+// The flags that begin with this one and a hyphen: --fill-holes for --fill.
 std::vector<std::string> longer_than(const std::string& flag, const std::vector<std::string>& flags) {
     std::vector<std::string> out;
     for (const auto& other : flags)

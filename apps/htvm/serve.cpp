@@ -58,7 +58,7 @@ void write_event(const live::Event& event, bool json) {
     }
 }
 
-// Of a name: as many as a person can read.
+// So many events of a name can a person read.
 constexpr std::uint64_t told_each_second = 20;
 
 // Where to open it in a browser.

@@ -100,7 +100,7 @@ std::optional<Point3> facing_of(const Mesh& mesh) {
         sum = sum + normal;
         area += std::sqrt(dot(normal, normal));
     }
-    // Of the area, how much must face one way more than any other: a half sphere faces its pole by a half.
+    // How much of the area must face one way more than any other: a half sphere faces its pole by a half.
     constexpr double least = 0.25;
     if (!(std::sqrt(dot(sum, sum)) > least * area)) return std::nullopt;
     return sum * (1 / area);

@@ -63,30 +63,23 @@ inline std::optional<LevelsByChance> levels_by_chance(const LatticeMesh& base, c
 inline std::vector<std::uint8_t> level_colours_by_chance(std::span<const Colour> colours, std::int32_t step,
                                                          std::size_t coded, std::int32_t most, SurfaceDetail& detail,
                                                          std::mt19937& random) {
-    std::vector<Colour> all(colours.begin(), colours.end());
-    std::vector<ColourDifference> differences(all.size());
+    LevelColours known(colours);
     const auto models = std::make_unique<LevelColourModels>();
-    ByteWriter out;
+    const auto any = [&](const EdgeStencil&, const LevelColourContext&) {
+        ColourDifference wanted{};
+        if (random() % 3 == 0)
+            for (auto& c : wanted)
+                c = static_cast<std::int32_t>(random() % (2u * static_cast<unsigned>(most) + 1)) - most;
+        return wanted;
+    };
     std::vector<std::vector<std::uint8_t>> runs;
     for (std::size_t k = 0; k < coded; ++k) {
-        const auto& level = detail.levels[k];
         RangeEncoder encoder;
         WritingCoder<RangeEncoder> coder{encoder};
-        for (std::size_t i = 0; i < level.stencils.size(); ++i) {
-            ColourDifference wanted{};
-            if (random() % 3 == 0)
-                for (auto& c : wanted)
-                    c = static_cast<std::int32_t>(random() % (2u * static_cast<unsigned>(most) + 1)) - most;
-            const auto context = level_colour_context(level, i, differences, all, step);
-            differences.push_back(code_level_colour(coder, *models, context, wanted));
-            all.push_back(level_colour(level.stencils[i], all, wanted, step));
-            detail.colours.push_back(levels_of(wanted, step));
-        }
+        code_level_colours(coder, *models, k, step, known, detail, any);
         runs.push_back(encoder.finish());
-        out.varint(runs.back().size());
     }
-    for (const auto& run : runs) out.bytes(run);
-    return out.take();
+    return write_level_colours(runs);
 }
 
 // An I-frame's payload without a pose, and what decoders make of it.

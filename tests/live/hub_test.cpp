@@ -316,7 +316,7 @@ TEST_F(HubTest, WhereMemoryIsUsedUpTheStreamThatHoldsMostGivesWay) {
     EXPECT_EQ(closing(mallory), "");
     EXPECT_EQ(closing(anna), "");
     EXPECT_EQ(hub.counters().gave_way, 1u);
-    // Of those that hold most nobody else is disturbed for them.
+    // Nobody is disturbed for those that hold most.
     EXPECT_TRUE(hub.receive_part(mallory, 5 * size, start));
     EXPECT_FALSE(hub.receive_part(mallory, 9 * size, start));
     EXPECT_EQ(closing(mallory), "1013 this hub's memory for packets is used up");

@@ -114,6 +114,12 @@ std::int32_t step_for_reference(double edge, std::int32_t step) {
     return half_edge >= 1 && half_edge < step ? static_cast<std::int32_t>(half_edge) : step;
 }
 
+void tell_captured(FramePayload& payload, CapturedCounts captured, const CodedPose& pose) {
+    payload.header.source_vertices = captured.vertices;
+    payload.header.source_triangles = captured.triangles;
+    payload.set(Layer::pose, encode_pose(pose));
+}
+
 Result<CodedIntra> code_intra_mesh(const Configuration& configuration, const LatticeMesh& mesh, const FrameSteps& steps,
                                    bool renewal, CapturedCounts captured, const CodedPose& pose) {
     IntraFrameOptions options;
@@ -127,9 +133,7 @@ Result<CodedIntra> code_intra_mesh(const Configuration& configuration, const Lat
     if (!decoded) return tl::unexpected(decoded.error());
     out.decoded = std::move(*decoded);
     out.step = smooth_as_shown(out.decoded, options.geometry_step, renewal, configuration.header);
-    out.payload.header.source_vertices = captured.vertices;
-    out.payload.header.source_triangles = captured.triangles;
-    out.payload.set(Layer::pose, encode_pose(pose));
+    tell_captured(out.payload, captured, pose);
     return out;
 }
 

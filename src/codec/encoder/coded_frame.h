@@ -90,6 +90,9 @@ CapturedCounts counts_of(const LatticeMesh& captured);
 // 8 mm and 35,000 vertices this takes a fifth fewer bits at the same error.
 std::int32_t step_for_reference(double edge, std::int32_t step);
 
+// Says in an I-frame's payload what it was captured with.
+void tell_captured(FramePayload& payload, CapturedCounts captured, const CodedPose& pose);
+
 // An I-frame's mesh, coded; charts and packet are still to be added.
 struct CodedIntra {
     FramePayload payload;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 
-#include "core/bytes.h"
 #include "core/geometry.h"
 #include "entropy/cost.h"
 #include "entropy/range_coder.h"
@@ -69,43 +68,33 @@ std::vector<std::uint8_t> encode_level_colours(const LatticeMesh& mesh, const La
                                                const SurfaceIndex& surface, std::size_t coded,
                                                const LevelColourOptions& options, SurfaceDetail& detail) {
     const auto wanted = wanted_colours(mesh, captured, surface, coded, options.reach, options.threads, detail);
-    auto all = mesh.colours;
-    std::vector<ColourDifference> differences(all.size());
-    const auto models = std::make_unique<LevelColourModels>();
+    LevelColours colours(mesh.colours);
+    const auto models = std::make_unique<LevelColourModels>(), trial = std::make_unique<LevelColourModels>();
+    const auto bits_of = [&](const LevelColourContext& context, const ColourDifference& difference) {
+        CostCounter counter;
+        WritingCoder<CostCounter> coder{counter};
+        *trial = *models;
+        code_level_colour(coder, *trial, context, difference);
+        return counter.bits();
+    };
+    const auto chosen = [&](const EdgeStencil& stencil, const LevelColourContext& context) {
+        const auto& want = wanted[detail.colours.size()];
+        if (!want.known) return ColourDifference{};
+        const auto near = nearest_to(want, level_colour(stencil, colours.all, {}, options.step), options.step);
+        // A difference takes some bits at least, so most need not be priced.
+        if (near.difference == ColourDifference{} || near.left_by_none - near.left <= 2 * options.lambda)
+            return ColourDifference{};
+        const double with = near.left + options.lambda * bits_of(context, near.difference);
+        return with < near.left_by_none + options.lambda * bits_of(context, {}) ? near.difference : ColourDifference{};
+    };
     std::vector<std::vector<std::uint8_t>> runs;
     for (std::size_t k = 0; k < coded; ++k) {
-        const auto& level = detail.levels[k];
         RangeEncoder encoder;
         WritingCoder<RangeEncoder> coder{encoder};
-        for (std::size_t i = 0; i < level.stencils.size(); ++i) {
-            const auto context = level_colour_context(level, i, differences, all, options.step);
-            const auto& want = wanted[detail.colours.size()];
-            ColourDifference chosen{};
-            if (want.known) {
-                const auto near =
-                    nearest_to(want, level_colour(level.stencils[i], all, {}, options.step), options.step);
-                // A difference takes some bits at least, so most need not be priced.
-                if (near.difference != ColourDifference{} && near.left_by_none - near.left > 2 * options.lambda) {
-                    auto trial = std::make_unique<LevelColourModels>(*models);
-                    CostCounter with, without;
-                    WritingCoder<CostCounter> coder_with{with}, coder_without{without};
-                    code_level_colour(coder_with, *trial, context, near.difference);
-                    *trial = *models;
-                    code_level_colour(coder_without, *trial, context, {});
-                    if (near.left + options.lambda * with.bits() < near.left_by_none + options.lambda * without.bits())
-                        chosen = near.difference;
-                }
-            }
-            differences.push_back(code_level_colour(coder, *models, context, chosen));
-            all.push_back(level_colour(level.stencils[i], all, chosen, options.step));
-            detail.colours.push_back(levels_of(chosen, options.step));
-        }
+        code_level_colours(coder, *models, k, options.step, colours, detail, chosen);
         runs.push_back(encoder.finish());
     }
-    ByteWriter out;
-    for (const auto& run : runs) out.varint(run.size());
-    for (const auto& run : runs) out.bytes(run);
-    return out.take();
+    return write_level_colours(runs);
 }
 
 }  // namespace htvm::internal

@@ -51,10 +51,8 @@ std::int32_t chosen_value(DisplacementModels& models, const DisplacementContext&
 // The fit sees the level that rounds off as if it split every edge that is long enough. False if these are too many.
 bool add_all_rounded(const LatticeMesh& base, const SurfaceLevels& levels, const MeshEdges& finest,
                      std::vector<SubdivisionLevel>& subdivision) {
-    std::vector<Vector3d> flat;
-    for (const auto p : base.positions) flat.push_back(to_vector(p));
-    for (const auto& level : subdivision)
-        for (const auto& s : level.stencils) flat.push_back((flat[s.a] + flat[s.b]) * 0.5);
+    auto flat = places_of(base.positions);
+    for (const auto& level : subdivision) add_middles(level, flat);
     std::vector<std::uint8_t> split;
     for (const auto& [a, b] : finest.ends) {
         const Vector3d side = (flat[b] - flat[a]) * 2;

@@ -63,6 +63,13 @@ Colour level_colour(const EdgeStencil& stencil, std::span<const Colour> colours,
     return off_mean(colours[stencil.a], colours[stencil.b], levels_of(difference, step));
 }
 
+std::vector<std::uint8_t> write_level_colours(std::span<const std::vector<std::uint8_t>> runs) {
+    ByteWriter out;
+    for (const auto& run : runs) out.varint(run.size());
+    for (const auto& run : runs) out.bytes(run);
+    return out.take();
+}
+
 Result<void> decode_level_colours(std::span<const std::uint8_t> layer, std::span<const Colour> colours,
                                   std::int32_t step, std::size_t coded, SurfaceDetail& detail) {
     if (step < 1 || step > 255)
@@ -72,8 +79,7 @@ Result<void> decode_level_colours(std::span<const std::uint8_t> layer, std::span
     for (std::size_t k = 0; k < coded; ++k) sizes[k] = in.varint();
     if (!in.ok()) return fail(ErrorKind::corrupt_stream, "colours of levels: the layer is cut off");
     std::size_t begin = in.position();
-    std::vector<Colour> all(colours.begin(), colours.end());
-    std::vector<ColourDifference> differences(all.size());
+    LevelColours known(colours);
     const auto models = std::make_unique<LevelColourModels>();
     for (std::size_t k = 0; k < coded; ++k) {
         if (sizes[k] > layer.size() - begin)
@@ -81,13 +87,8 @@ Result<void> decode_level_colours(std::span<const std::uint8_t> layer, std::span
         RangeDecoder decoder(layer.subspan(begin, static_cast<std::size_t>(sizes[k])));
         begin += static_cast<std::size_t>(sizes[k]);
         ReadingCoder<RangeDecoder> coder{decoder};
-        const auto& level = detail.levels[k];
-        for (std::size_t i = 0; i < level.stencils.size(); ++i) {
-            const auto context = level_colour_context(level, i, differences, all, step);
-            differences.push_back(code_level_colour(coder, *models, context, {}));
-            all.push_back(level_colour(level.stencils[i], all, differences.back(), step));
-            detail.colours.push_back(levels_of(differences.back(), step));
-        }
+        code_level_colours(coder, *models, k, step, known, detail,
+                           [](const EdgeStencil&, const LevelColourContext&) { return ColourDifference{}; });
         if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "colours of levels: a run ends too early");
     }
     if (begin != layer.size()) return fail(ErrorKind::corrupt_stream, "colours of levels: bytes follow the last run");

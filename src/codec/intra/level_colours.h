@@ -73,6 +73,33 @@ std::array<std::int32_t, 3> levels_of(const ColourDifference& difference, std::i
 Colour level_colour(const EdgeStencil& stencil, std::span<const Colour> colours, const ColourDifference& difference,
                     std::int32_t step);
 
+// The vertices so far: those of the reference, then the detail's.
+struct LevelColours {
+    std::vector<Colour> all;
+    std::vector<ColourDifference> differences;
+    explicit LevelColours(std::span<const Colour> of_reference)
+        : all(of_reference.begin(), of_reference.end()), differences(of_reference.size()) {}
+};
+
+// Codes the colours of one level of the detail, and adds them to both. choose(stencil, context) gives the difference
+// that is wanted; decoding, anything.
+template <class Coder, class Choose>
+void code_level_colours(Coder& coder, LevelColourModels& models, std::size_t number, std::int32_t step,
+                        LevelColours& colours, SurfaceDetail& detail, const Choose& choose) {
+    const auto& level = detail.levels[number];
+    for (std::size_t i = 0; i < level.stencils.size(); ++i) {
+        const auto& stencil = level.stencils[i];
+        const auto context = level_colour_context(level, i, colours.differences, colours.all, step);
+        const auto difference = code_level_colour(coder, models, context, choose(stencil, context));
+        colours.differences.push_back(difference);
+        colours.all.push_back(level_colour(stencil, colours.all, difference, step));
+        detail.colours.push_back(levels_of(difference, step));
+    }
+}
+
+// The layer of these runs.
+std::vector<std::uint8_t> write_level_colours(std::span<const std::vector<std::uint8_t>> runs);
+
 // Sets detail.colours, of its first levels, from the layer. colours: of the reference's vertices. coded: how many
 // levels are. Errors: corrupt_stream.
 Result<void> decode_level_colours(std::span<const std::uint8_t> layer, std::span<const Colour> colours,

@@ -112,10 +112,7 @@ bool round_off(const SurfaceLevels& levels, const MeshEdges& edges, std::size_t 
                LeveledSurface& surface) {
     const auto& triangles = surface.finest();
     const double least = displacement_of(static_cast<std::int32_t>(levels.rounded), levels.step) / 32;
-    std::vector<Vector3d> places;
-    places.reserve(surface.positions.size());
-    for (const auto& p : surface.positions) places.push_back(to_vector(p));
-    auto level = split_edges(places, triangles, edges,
+    auto level = split_edges(places_of(surface.positions), triangles, edges,
                              bent_edges(surface.positions, vertex_normals(surface.positions, triangles), edges, least),
                              most_vertices);
     if (!level) return false;

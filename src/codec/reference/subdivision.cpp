@@ -291,6 +291,18 @@ private:
 
 }  // namespace
 
+std::vector<Vector3d> places_of(std::span<const LatticePoint> positions) {
+    std::vector<Vector3d> out;
+    out.reserve(positions.size());
+    for (const auto p : positions) out.push_back(to_vector(p));
+    return out;
+}
+
+void add_middles(const SubdivisionLevel& level, std::vector<Vector3d>& places) {
+    places.reserve(places.size() + level.stencils.size());
+    for (const auto& s : level.stencils) places.push_back((places[s.a] + places[s.b]) * 0.5);
+}
+
 std::optional<SubdivisionLevel> split_edges(std::span<const Vector3d> places, std::span<const Triangle> triangles,
                                             const MeshEdges& edges, std::span<const std::uint8_t> split,
                                             std::size_t most_vertices, MeshEdges* next) {
@@ -338,8 +350,7 @@ std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, 
                                                        std::size_t most_vertices, MeshEdges* finest) {
     std::vector<SubdivisionLevel> out;
     // Where vertices lie on the base: halves of integers at most most_levels times, so exact.
-    std::vector<Vector3d> flat;
-    for (const auto p : base.positions) flat.push_back(to_vector(p));
+    auto flat = places_of(base.positions);
     std::vector<std::uint8_t> split;
     // Two triangles that lie on each other have edges of their own from the first level on.
     auto edges = depth.levels > 0 || finest ? find_edges(flat.size(), base.triangles) : MeshEdges{};
@@ -355,8 +366,7 @@ std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, 
         auto level =
             split_edges(flat, triangles, edges, split, most_vertices, k < depth.levels || finest ? &next : nullptr);
         if (!level) return std::nullopt;
-        flat.reserve(flat.size() + level->stencils.size());
-        for (const auto& s : level->stencils) flat.push_back((flat[s.a] + flat[s.b]) * 0.5);
+        add_middles(*level, flat);
         edges = std::move(next);
         out.push_back(std::move(*level));
     }

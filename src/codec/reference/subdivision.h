@@ -95,6 +95,10 @@ inline constexpr std::uint32_t most_levels = 8;
 std::optional<std::vector<SubdivisionLevel>> subdivide(const LatticeMesh& base, const SubdivisionDepth& depth,
                                                        std::size_t most_vertices, MeshEdges* finest = nullptr);
 
+// The places of these vertices, and with add_middles() of a level's behind them, in the middles of their edges.
+std::vector<Vector3d> places_of(std::span<const LatticePoint> positions);
+void add_middles(const SubdivisionLevel& level, std::vector<Vector3d>& places);
+
 // One level more, which splits the edges that are said. edges: of the triangles. split: one per edge, 1 or 0. places:
 // of the vertices; where two sides of a triangle are split, they say along which diagonal it is cut. next: if given,
 // set to the level's edges. Nothing if there would be more vertices than these.

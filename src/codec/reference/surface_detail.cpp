@@ -86,8 +86,7 @@ SurfaceDetail detail_that_stays(const SurfaceDetail& before, std::size_t vertice
     // The new number of each vertex before, of all levels so far.
     std::vector<std::uint32_t> number(vertices_before + before.vertices(), no_element);
     for (std::uint32_t v = 0; v < stays.size(); ++v) number[stays[v]] = v;
-    std::vector<Vector3d> places;
-    for (const auto p : patched.positions) places.push_back(to_vector(p));
+    auto places = places_of(patched.positions);
     auto edges = before.empty() ? MeshEdges{} : find_edges(places.size(), patched.triangles);
     // Splits that stay, by their ends.
     struct Split {
@@ -130,7 +129,7 @@ SurfaceDetail detail_that_stays(const SurfaceDetail& before, std::size_t vertice
         auto split =
             split_edges(places, triangles, edges, is_split, patched.positions.size() + before.vertices(), &next);
         if (!split) break;
-        for (const auto& s : split->stencils) places.push_back((places[s.a] + places[s.b]) * 0.5);
+        add_middles(*split, places);
         edges = std::move(next);
         out.levels.push_back(std::move(*split));
         out.rules.push_back(before.rules[k]);

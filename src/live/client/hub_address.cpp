@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <charconv>
 
+#include "core/letter_case.h"
+
 namespace htvm::live {
 namespace {
 
@@ -10,12 +12,7 @@ constexpr std::string_view plain = "ws://", by_tls = "wss://";
 constexpr std::uint16_t plain_port = 80, tls_port = 443;
 constexpr std::size_t longest = 2048, longest_host = 253;
 
-std::string lower_case(std::string_view text) {
-    std::string out(text);
-    for (char& c : out)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return out;
-}
+using internal::lower_case;
 
 bool is_in_name(char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' ||

@@ -51,7 +51,7 @@ public:
     HubMemory(std::size_t most, std::size_t most_of_one) : most_(most), most_of_one_(most_of_one) {}
 
     SharedShare share_of(const std::string& stream);
-    // Of all, what is about to be given back included.
+    // What all hold, what is about to be given back included.
     std::size_t bytes() const { return *total_; }
 
     // Whether the share may take so much more.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/letter_case.h"
 #include "live/hub/stream_name.h"
 
 namespace htvm::live {
@@ -18,12 +19,7 @@ net::ip::address counted_address(const net::ip::address& address) {
     return net::ip::address_v6(bytes);
 }
 
-std::string in_lower_case(std::string_view text) {
-    std::string out(text);
-    for (auto& c : out)
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    return out;
-}
+using internal::lower_case;
 
 std::string_view host_without_port(std::string_view host) {
     const auto colon = host.rfind(':');
@@ -31,11 +27,11 @@ std::string_view host_without_port(std::string_view host) {
                                                                                               : host.substr(0, colon);
 }
 
-bool same_host(std::string_view a, std::string_view b) { return in_lower_case(a) == in_lower_case(b); }
+bool same_host(std::string_view a, std::string_view b) { return lower_case(a) == lower_case(b); }
 
 // Sites are the same whatever the case of their letters, and with the port that their scheme has anyway or without.
 std::string normal_origin(std::string_view origin) {
-    auto out = in_lower_case(origin);
+    auto out = lower_case(origin);
     for (const auto& [scheme, port] : {std::pair("http://", ":80"), std::pair("https://", ":443")})
         if (out.starts_with(scheme) && out.ends_with(port)) out.resize(out.size() - std::string_view(port).size());
     return out;

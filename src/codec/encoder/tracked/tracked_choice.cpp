@@ -387,8 +387,8 @@ Result<Frame> code_stand_in(const TrackedWork& work, Tracking& tracking, const F
 
 SurfaceErrors errors_of(const TrackedWork& work, const CodedFrame& frame) {
     const auto& detail = detail_of(frame, work.reference ? &work.reference->decoded : nullptr);
-    return errors_between(work.captured.mesh, work.surface,
-                          detail.empty() ? frame.decoded : detailed(detail, frame.decoded), work.configuration.threads);
+    return errors_between(work.captured.mesh, work.surface, detailed(detail, frame.decoded),
+                          work.configuration.threads);
 }
 
 }  // namespace htvm::internal

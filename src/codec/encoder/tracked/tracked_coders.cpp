@@ -89,9 +89,8 @@ Presence presence_by_place(const IntraSource& source, const LatticeMesh& coded, 
 
 // The frame that a coded mesh becomes, with its charts. steps: asked for.
 Result<TrackedIntra> sent_as(const TrackedWork& work, CodedIntra coded, Presence presence, bool renewal,
-                             const FrameSteps& steps, IntraUse use, FrameReason reason) {
+                             const FrameSteps& steps, FrameReason reason) {
     const auto& configuration = work.configuration;
-    const bool referred_to = use == IntraUse::reference;
     StageClock clock(work.stages);
     auto charts = add_charts(coded.decoded, configuration.options.texture, coded.payload);
     if (!charts) return tl::unexpected(charts.error());
@@ -116,10 +115,17 @@ Result<TrackedIntra> sent_as(const TrackedWork& work, CodedIntra coded, Presence
     origin.steps = steps;
     origin.chart_scale = charts->scale;
     origin.vertices = frame.decoded.positions.size();
-    if (referred_to) origin.colours = colours_at(work, frame.decoded);
     clock.done("intra coding");
-    if (referred_to && frame.referred) origin.fit = fit_of(work, frame.decoded, origin.edge, {});
     return out;
+}
+
+// What tracking measures frames by that refer to this one.
+void prepare_reference(const TrackedWork& work, TrackedIntra& intra) {
+    auto& origin = intra.origin;
+    StageClock clock(work.stages);
+    origin.colours = colours_at(work, intra.frame.decoded);
+    clock.done("intra coding");
+    if (intra.frame.referred) origin.fit = fit_of(work, intra.frame.decoded, origin.edge, {});
 }
 
 // steps: asked for.
@@ -140,15 +146,13 @@ Result<TrackedIntra> code_intra_of(const TrackedWork& work, const IntraSource& s
         coded->payload.set(Layer::presence, write_presence_layer(coded->decoded.triangles, presence));
     }
     clock.done("intra coding");
-    return sent_as(work, std::move(*coded), std::move(presence), source.renewal, steps, use, reason);
+    return sent_as(work, std::move(*coded), std::move(presence), source.renewal, steps, reason);
 }
 
-// An I-frame's base and its levels. source: with the colours that are to be coded. surface: its index. Nothing if the
-// detail would have too many vertices.
-Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const LatticeMesh& source,
-                                                const SurfaceIndex& surface, bool renewal, const FrameSteps& steps,
-                                                FrameReason reason) {
+// The capture as a base and its levels. Nothing if the detail would have too many vertices.
+Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const FrameSteps& steps, FrameReason reason) {
     const auto& configuration = work.configuration;
+    const auto& source = work.captured.mesh;
     const auto quantised = tracked_steps(steps);
     StageClock clock(work.stages);
     LeveledIntraOptions options;
@@ -170,7 +174,7 @@ Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const L
         mesh.colours.resize(mesh.positions.size());
         const auto bulges = bulges_of(coded.detail, mesh.positions, mesh.triangles);
         const auto targets = find_tracked_targets(
-            {mesh.positions, normals, mesh.triangles, mesh.colours, bulges}, source, surface,
+            {mesh.positions, normals, mesh.triangles, mesh.colours, bulges}, source, work.surface,
             {.reach = configuration.scale.on_lattice(tracking_numbers.reach), .threads = configuration.threads});
         mesh.colours = recoloured(mesh.colours, targets.colours);
     }
@@ -183,14 +187,11 @@ Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const L
         colour_options.reach = configuration.scale.on_lattice(tracking_numbers.reach).value;
         colour_options.threads = configuration.threads;
         coded.payload.set(Layer::level_colours,
-                          encode_level_colours(mesh, source, surface, coded_below, colour_options, coded.detail));
+                          encode_level_colours(mesh, source, work.surface, coded_below, colour_options, coded.detail));
     }
-    const auto captured = counts_of(work.captured.mesh);
-    coded.payload.header.source_vertices = captured.vertices;
-    coded.payload.header.source_triangles = captured.triangles;
-    coded.payload.set(Layer::pose, encode_pose(work.captured.pose));
+    tell_captured(coded.payload, counts_of(source), work.captured.pose);
     clock.done("intra coding");
-    auto sent = sent_as(work, std::move(coded), {}, renewal, steps, IntraUse::reference, reason);
+    auto sent = sent_as(work, std::move(coded), {}, false, steps, reason);
     if (!sent) return tl::unexpected(sent.error());
     return std::optional(std::move(*sent));
 }
@@ -221,11 +222,15 @@ Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameS
     const bool simplify = work.configuration.options.tracked.simplify > 0 && carries_surface(work.captured.mesh);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
     auto flat = code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use, reason);
-    if (!flat || use != IntraUse::reference || !codes_levels(work)) return flat;
-    auto leveled = code_levels(work, work.captured.mesh, work.surface, false, steps, reason);
-    if (!leveled) return tl::unexpected(leveled.error());
-    return *leveled && price_of(work, (*leveled)->frame) < price_of(work, flat->frame) ? std::move(**leveled)
-                                                                                       : std::move(*flat);
+    if (!flat || use != IntraUse::reference) return flat;
+    auto& chosen = *flat;
+    if (codes_levels(work)) {
+        auto leveled = code_levels(work, steps, reason);
+        if (!leveled) return tl::unexpected(leveled.error());
+        if (*leveled && price_of(work, (*leveled)->frame) < price_of(work, chosen.frame)) chosen = std::move(**leveled);
+    }
+    prepare_reference(work, chosen);
+    return flat;
 }
 
 // Not where frames are to have an error that is measured against the capture, noise and all.
@@ -339,6 +344,7 @@ Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& ste
     auto out = code_intra_of(work, {tells_presence ? lately : tracked.mesh, std::move(presence), true}, steps,
                              quantised, IntraUse::reference, reason);
     if (!out) return out;
+    prepare_reference(work, *out);
     const auto& before = work.reference->origin;
     out->origin.fit = least_of(std::move(out->origin.fit), before.fit);
     out->origin.vertices = before.vertices;

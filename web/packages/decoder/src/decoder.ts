@@ -274,7 +274,7 @@ function number(view: DataView, at: number, type: string): number {
     }
 }
 
-// Of metadata, at most.
+// So much of metadata at most.
 const mostKeyBytes = 255, mostValueBytes = 4095;
 
 /** Takes packets or bytes, gives frames. Errors cost the packet that they are about: go on receiving. */
@@ -391,7 +391,7 @@ export class Decoder {
         return Array.from({ length: constants.HTVM_LAYERS }, (_, i) => Number(view.getBigUint64(this.#scratch + 8 * i, true)));
     }
 
-    // Of keys that are there twice, the first.
+    // The first of keys that are there twice.
     #metadata(entries: number): Record<string, string> {
         const out: Record<string, string> = Object.create(null);
         if (entries === 0) return out;

@@ -12,7 +12,7 @@ export function frontOf(metadata: Record<string, string>): Direction | null {
     return [x / size, y / size, z / size];
 }
 
-// Of the area, how much must face one way more than any other: a closed surface, or one seen from all sides, faces none;
+// How much of the area must face one way more than any other: a closed surface, or one seen from all sides, faces none;
 // a half sphere faces its pole by a half.
 const least = 0.25;
 

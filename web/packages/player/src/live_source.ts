@@ -289,7 +289,7 @@ export class LiveSource {
         if (!this.#over) this.#listener.failed(error);
     }
 
-    // Of a stream that has ended nothing is said until something comes: whoever is restarted brings it back.
+    // Nothing is said of a stream that has ended until something comes: whoever is restarted brings it back.
     #opened(): void {
         if (!this.#over) this.#listener.link('open', '');
     }
