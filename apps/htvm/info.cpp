@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "codec/format/frame_kinds.h"
+#include "codec/intra/leveled_frame.h"
 #include "command_line/capture.h"
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
@@ -47,9 +48,11 @@ class FrameInspector {
 public:
     struct Inspected {
         FrameInfo info;
-        std::optional<double> recoded;  // recoded_share(); nothing if it is not known
+        std::optional<double> recoded;                  // recoded_share(); nothing if it is not known
+        std::vector<internal::LevelShare> levels = {};  // of an I-frame that has any
     };
-    explicit FrameInspector(Decoder& decoder) : decoder_(decoder) {}
+    FrameInspector(Decoder& decoder, const DecoderOptions& limits)
+        : decoder_(decoder), most_vertices_(limits.max_vertices) {}
     Result<Inspected> inspect(const Packet& packet) {
         const auto type = frame_type(packet.kind);
         if (type == FrameType::intra && internal::is_referred(packet, internal::rules_of(*type))) intra_ = packet;
@@ -62,11 +65,20 @@ public:
                 return Inspected{(*decoded)->info, recoded_share((*decoded)->mesh, *sent)};
             return Inspected{*sent, {}};
         }
-        return Inspected{*sent, type == FrameType::predicted ? 0.0 : 1.0};
+        return Inspected{*sent, type == FrameType::predicted ? 0.0 : 1.0,
+                         type == FrameType::intra ? levels_of(packet) : std::vector<internal::LevelShare>()};
     }
 
 private:
+    std::vector<internal::LevelShare> levels_of(const Packet& packet) const {
+        const auto payload = internal::read_frame_payload(packet.payload);
+        auto shares =
+            payload ? internal::level_shares(*payload, most_vertices_) : Result<std::vector<internal::LevelShare>>();
+        return shares ? std::move(*shares) : std::vector<internal::LevelShare>();
+    }
+
     Decoder& decoder_;
+    std::size_t most_vertices_;
     std::optional<Packet> intra_;  // the last that may be referred to, as long as nothing needed it
 };
 
@@ -184,6 +196,44 @@ void add(PatchedArea& area, FrameType type, std::optional<double> recoded) {
     area.largest = std::max(area.largest, *recoded);
 }
 
+// Adds those of one I-frame to those of all.
+void add(std::vector<internal::LevelShare>& sum, std::span<const internal::LevelShare> levels) {
+    if (sum.size() < levels.size()) sum.resize(levels.size());
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+        sum[k].vertices += levels[k].vertices;
+        sum[k].bytes += levels[k].bytes;
+        sum[k].colour_bytes += levels[k].colour_bytes;
+        sum[k].referred = levels[k].referred;
+    }
+}
+
+nlohmann::json levels_json(std::span<const internal::LevelShare> levels) {
+    nlohmann::json out = nlohmann::json::array();
+    for (const auto& level : levels)
+        out.push_back({{"vertices", level.vertices},
+                       {"bytes", level.bytes},
+                       {"colour_bytes", level.colour_bytes},
+                       {"referred", level.referred}});
+    return out;
+}
+
+// What each level takes, a line each. frames: how many I-frames have levels.
+std::string levels_text(std::span<const internal::LevelShare> levels, std::size_t frames) {
+    if (frames == 0) return {};
+    std::string out = fmt::format("levels, a mean of {}:\n", counted(frames, "I-frame"));
+    const auto mean = [&](std::size_t sum) { return static_cast<double>(sum) / static_cast<double>(frames); };
+    std::size_t referred = 0;
+    for (std::size_t k = 0; k < levels.size(); ++k) {
+        const auto& level = levels[k];
+        out += fmt::format("  {:<7} {:>7.0f} more vertices, {:>6.0f} bytes",
+                           k == 0 ? "base" : fmt::format("level {}", k), mean(level.vertices), mean(level.bytes));
+        if (level.colour_bytes > 0) out += fmt::format(", {:.0f} of colours", mean(level.colour_bytes));
+        referred += level.referred ? 1 : 0;
+        out += level.referred ? "\n" : fmt::format("; left out by decode --level {}\n", k - referred);
+    }
+    return out;
+}
+
 nlohmann::json patched_area_json(const PatchedArea& area) {
     if (area.frames == 0) return {};
     return {{"frames", area.frames},
@@ -286,6 +336,8 @@ struct Findings {
     AudioTotals audio;
     StreamPictures pictures;
     PatchedArea patched;
+    std::vector<internal::LevelShare> levels;  // of all I-frames that have any
+    std::size_t leveled_frames = 0;
     std::optional<SequenceInfo> first_sequence;
     nlohmann::json sequence_list = nlohmann::json::array(), frame_list = nlohmann::json::array();
 };
@@ -295,7 +347,7 @@ struct Inspection {
     const Options& options;
     Decoder headers =
         Decoder(options.limits);  // takes the sequence headers, and frames where the inspector asks for it
-    FrameInspector inspector = FrameInspector(headers);
+    FrameInspector inspector = FrameInspector(headers, options.limits);
     FrameNumbers numbers = {};
     RunningTime time = {};
     LayerBytes codebooks = {};               // that came since the last frame
@@ -364,7 +416,7 @@ void begin_sequence(Inspection& in, std::uint32_t first_frame) {
 Result<void> take_frame(Inspection& in, const Packet& packet) {
     auto inspected = in.inspector.inspect(packet);
     if (!inspected) return tl::unexpected(inspected.error());
-    auto& [frame, recoded] = *inspected;
+    auto& [frame, recoded, levels] = *inspected;
     auto& found = in.found;
     frame.bytes += std::exchange(in.codebooks, {});
     frame.frame = in.numbers.of(frame.frame);
@@ -374,9 +426,12 @@ Result<void> take_frame(Inspection& in, const Packet& packet) {
     found.has_groups = found.has_groups || frame.group > 1;
     add(found.totals, frame);
     add(found.patched, frame.type, recoded);
+    add(found.levels, levels);
+    found.leveled_frames += levels.empty() ? 0 : 1;
     if (in.options.json) {
         found.frame_list.push_back(frame_json(frame));
         found.frame_list.back()["recoded_share"] = recoded ? nlohmann::json(*recoded) : nlohmann::json();
+        if (!levels.empty()) found.frame_list.back()["levels"] = levels_json(levels);
     }
     if (in.lists_frames()) print_frame(frame, found.front && is_start(*found.front, frame.frame));
     return {};
@@ -453,6 +508,7 @@ void print_totals(const Inspection& in) {
     if (patched.patched > 0)
         fmt::print("patches in {} replace {:.2f} % of the surface a T- or TP-frame on average, at most {:.1f} %\n",
                    counted(patched.patched, "TP-frame"), 100 * patched.mean(), 100 * patched.largest);
+    fmt::print("{}", levels_text(found.levels, found.leveled_frames));
     fmt::print("{}{}{} in {:.2f} s, {} bytes ({} outside frames), {:.2f} Mbit/s{}\n", layer_table(found.totals),
                reasons_text(found.totals), counted(found.frames, "frame"), size.seconds, found.bytes,
                size.bytes_outside_frames, size.megabits_per_second,

@@ -69,6 +69,37 @@ TEST(LeveledFrame, what_the_encoder_says_of_it_is_what_is_decoded_to_the_bit) {
     }
 }
 
+TEST(LeveledFrame, the_shares_of_its_levels_are_all_of_its_vertices_and_bytes) {
+    for (const std::uint32_t referred : {1u, 2u}) {
+        const auto some = some_frame(referred);
+        const auto payload = view_of(some.payload);
+        const auto shares = level_shares(payload, any_number);
+        ASSERT_TRUE(shares) << shares.error().message;
+        ASSERT_EQ(shares->size(), 4u) << "the base, two levels, and the one that rounds off";
+        std::size_t vertices = 0, of_mesh = 0, bytes = 0, colour_bytes = 0;
+        for (const auto& share : *shares) {
+            vertices += share.vertices;
+            of_mesh += share.referred ? share.vertices : 0;
+            bytes += share.bytes;
+            colour_bytes += share.colour_bytes;
+        }
+        EXPECT_EQ(of_mesh, some.frame.mesh.positions.size());
+        EXPECT_EQ(vertices, detailed(some.frame.detail, some.frame.mesh).positions.size());
+        EXPECT_EQ(shares->back().bytes, 0u);
+        const std::size_t coded =
+            payload.of(Layer::fans).size() + payload.of(Layer::geometry).size() + payload.of(Layer::levels).size();
+        EXPECT_LT(bytes, coded) << "the header of the levels is none's";
+        EXPECT_GE(bytes + 24, coded);
+        const std::size_t colours = payload.of(Layer::colour).size() + payload.of(Layer::level_colours).size();
+        EXPECT_LE(colour_bytes, colours);
+        EXPECT_GE(colour_bytes + 8, colours);
+    }
+    FramePayload flat;
+    const auto none = level_shares(view_of(flat), any_number);
+    ASSERT_TRUE(none);
+    EXPECT_TRUE(none->empty());
+}
+
 TEST(LeveledFrame, any_levels_of_any_mesh_come_back_to_the_bit) {
     unsigned seed = 1;
     std::size_t with_detail = 0;

@@ -22,6 +22,9 @@ struct TrackingNumbers {
     double coarser_colours = 1.3;  // step of an I-frame's colours, likewise
     double coarser_tracked_colours = 6;  // step of a T-frame's colours, likewise: re-meshing alone makes the colour at
                                          // one place vary, and finer steps code that noise
+    // Where simplification keeps more of the captured vertices than that, levels are not tried: what is left to say is
+    // the capture's own triangles (docs/experiments/hierarchy.md).
+    double levels_most_kept = 0.72;
     double levels_step = 0.85;  // step of an I-frame's finest displacements, where it has levels, in steps of positions
     std::uint32_t referred_level = 1;  // the level that T-frames refer to
     double finer_renewed = 0.5;  // step of an I-frame made of the tracked mesh, in steps of one made of the capture:

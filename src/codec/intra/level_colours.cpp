@@ -70,15 +70,23 @@ std::vector<std::uint8_t> write_level_colours(std::span<const std::vector<std::u
     return out.take();
 }
 
+Result<LevelColourRuns> level_colour_runs(std::span<const std::uint8_t> layer, std::size_t coded) {
+    LevelColourRuns out;
+    ByteReader in(layer);
+    for (std::size_t k = 0; k < coded; ++k) out.sizes[k] = in.varint();
+    if (!in.ok()) return fail(ErrorKind::corrupt_stream, "colours of levels: the layer is cut off");
+    out.first = in.position();
+    return out;
+}
+
 Result<void> decode_level_colours(std::span<const std::uint8_t> layer, std::span<const Colour> colours,
                                   std::int32_t step, std::size_t coded, SurfaceDetail& detail) {
     if (step < 1 || step > 255)
         return fail(ErrorKind::corrupt_stream, "colours of levels: the colour step is not within 1..255");
-    ByteReader in(layer);
-    std::array<std::uint64_t, most_levels> sizes{};
-    for (std::size_t k = 0; k < coded; ++k) sizes[k] = in.varint();
-    if (!in.ok()) return fail(ErrorKind::corrupt_stream, "colours of levels: the layer is cut off");
-    std::size_t begin = in.position();
+    const auto runs = level_colour_runs(layer, coded);
+    if (!runs) return tl::unexpected(runs.error());
+    const auto& sizes = runs->sizes;
+    std::size_t begin = runs->first;
     LevelColours known(colours);
     const auto models = std::make_unique<LevelColourModels>();
     for (std::size_t k = 0; k < coded; ++k) {

@@ -100,6 +100,13 @@ void code_level_colours(Coder& coder, LevelColourModels& models, std::size_t num
 // The layer of these runs.
 std::vector<std::uint8_t> write_level_colours(std::span<const std::vector<std::uint8_t>> runs);
 
+// How long each run is, and where the first begins in the layer. Errors: corrupt_stream.
+struct LevelColourRuns {
+    std::array<std::uint64_t, most_levels> sizes{};
+    std::size_t first = 0;
+};
+Result<LevelColourRuns> level_colour_runs(std::span<const std::uint8_t> layer, std::size_t coded);
+
 // Sets detail.colours, of its first levels, from the layer. colours: of the reference's vertices. coded: how many
 // levels are. Errors: corrupt_stream.
 Result<void> decode_level_colours(std::span<const std::uint8_t> layer, std::span<const Colour> colours,

@@ -34,6 +34,16 @@ LeveledFrame leveled_frame(const SurfaceLevels& levels, LeveledSurface surface, 
 std::vector<std::uint8_t> write_levels_layer(std::uint32_t referred, CapturedCounts base,
                                              std::span<const std::uint8_t> payload);
 
+// What a level adds to those above it; the base is the first.
+struct LevelShare {
+    std::size_t vertices = 0;
+    std::size_t bytes = 0;         // connectivity and places
+    std::size_t colour_bytes = 0;  // of the mesh that frames refer to, with the level that this is; of each below it
+    bool referred = false;         // whether frames refer to it and those above
+};
+// Of an I-frame that has levels; nothing where it has none. Errors: as decode_leveled_frame().
+Result<std::vector<LevelShare>> level_shares(const FramePayloadView& payload, std::size_t most_vertices);
+
 // most_vertices: of the mesh with all its detail. Errors: corrupt_stream, limit.
 Result<LeveledFrame> decode_leveled_frame(const FramePayloadView& payload, std::size_t most_vertices,
                                           Threads threads = {});

@@ -196,16 +196,19 @@ Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const F
     return std::optional(std::move(*sent));
 }
 
-// Whether I-frames that are referred to are coded as a base and its levels.
-bool codes_levels(const TrackedWork& work) {
+// Whether I-frames that are referred to are coded as a base and its levels. simple: the capture, simplified; empty
+// where it is not.
+bool codes_levels(const TrackedWork& work, const LatticeMesh& simple) {
     const auto& configuration = work.configuration;
     const auto& options = configuration.options;
     const auto& mesh = work.captured.mesh;
     const auto wanted = options.tracked.levels;
     if (wanted == ReferenceLevels::off || (wanted == ReferenceLevels::automatic && !work.effort.levels)) return false;
     return !options.intra_coder && (!configuration.tells_presence() || wanted == ReferenceLevels::on) &&
-           options.texture.layout == TextureLayout::none && options.tracked.simplify > 0 && mesh.texcoords.empty() &&
-           carries_surface(mesh) && !configuration.intra_only();
+           options.texture.layout == TextureLayout::none && !simple.positions.empty() && mesh.texcoords.empty() &&
+           !configuration.intra_only() &&
+           static_cast<double>(simple.positions.size()) <=
+               tracking_numbers.levels_most_kept * static_cast<double>(mesh.positions.size());
 }
 
 // What a coding of the same surface costs: bits where the error is equal, since a bit that is saved there brings so
@@ -224,7 +227,7 @@ Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameS
     auto flat = code_intra_of(work, {simplify ? simple : work.captured.mesh}, steps, tracked_steps(steps), use, reason);
     if (!flat || use != IntraUse::reference) return flat;
     auto& chosen = *flat;
-    if (codes_levels(work)) {
+    if (codes_levels(work, simple)) {
         auto leveled = code_levels(work, steps, reason);
         if (!leveled) return tl::unexpected(leveled.error());
         if (*leveled && price_of(work, (*leveled)->frame) < price_of(work, chosen.frame)) chosen = std::move(**leveled);
