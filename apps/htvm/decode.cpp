@@ -217,6 +217,7 @@ struct Decoding {
     SoundOutput* sound = nullptr;   // takes what is read, if sound is asked for
     std::uint32_t next_number = 0;  // of the frame after the last
     TextureOutput textures = TextureOutput(options.images.value_or(ImageFormat::png));
+    bool caught_up = false;  // with a live stream: who joins is sent what frames to come need, and none between
     std::optional<DecodedFrame> held = {};  // the last frame, until its picture has come
     std::optional<SequenceInfo> held_sequence = {};
 };
@@ -304,7 +305,7 @@ void tell_lost(Decoding& d) {
 Result<void> fill_gap(Decoding& d, std::uint32_t number, std::int64_t timestamp_us, bool is_frame) {
     auto& summary = d.summary;
     const std::uint32_t first = summary.due;
-    if (number <= first) return {};
+    if (number <= first || (d.input.is_live() && !d.caught_up)) return {};
     const std::uint32_t gap = number - first;
     const auto before = static_cast<std::uint64_t>(summary.timestamp_us.value_or(timestamp_us));
     const bool ascends = summary.timestamp_us && *summary.timestamp_us < timestamp_us;
@@ -352,10 +353,19 @@ Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error)
     return {};
 }
 
+// What a hub has for who joins comes at once; from the first packet on that is waited for, frames come as they are made.
+std::optional<Packet> next_packet(Decoding& d) {
+    constexpr std::chrono::milliseconds at_once{8};
+    const auto begin = std::chrono::steady_clock::now();
+    auto packet = d.input.next();
+    if (d.summary.timestamp_us && std::chrono::steady_clock::now() - begin > at_once) d.caught_up = true;
+    return packet;
+}
+
 // Decodes the next packet; true while there is more.
 Result<bool> decode_next(Decoding& d) {
     if (is_enough(d) && !d.held) return false;
-    const auto packet = d.input.next();
+    const auto packet = next_packet(d);
     const bool picture = packet && packet->kind == PacketKind::texture;
     if (picture) d.textures.take(*packet);
     d.summary.any_picture = d.summary.any_picture || picture;

@@ -215,6 +215,16 @@ Result<Floor> floor_of(const std::string& text) {
     return Floor{false, *metres};
 }
 
+// Below it, time is worth more than bits.
+constexpr int least_effort_with_groups = 3;
+
+// What the highest effort takes; 0 where there may be no groups.
+int largest_group(EncoderOptions options) {
+    options.tracked.effort = 9;
+    const int frames = frames_in_group(options);
+    return frames > 1 ? frames : 0;
+}
+
 // The library's options, with what the command takes in place of its defaults.
 EncoderOptions encoder_of(const EncodeRequest& request, const Destination& output) {
     auto out = encoder_options(request.encoding);
@@ -225,9 +235,10 @@ EncoderOptions encoder_of(const EncodeRequest& request, const Destination& outpu
     // A first frame that takes seconds is none to be watched live.
     if (!given(request, "tracked.levels") && may_not_wait(request)) out.tracked.levels = ReferenceLevels::off;
     // Nobody waits for the frames of a file.
-    if (!given(request, "latency_frames") && !is_piped(request.capture) && !output.may_be_live() &&
-        request.deadline == 0 && request.effort_log.empty())
-        out.latency_frames = 1;
+    const bool of_files = !is_piped(request.capture) && !may_not_wait(request) && request.effort_log.empty();
+    if (!given(request, "latency_frames") && of_files && !output.may_be_live()) out.latency_frames = 1;
+    if (of_files && out.tracked.group == 0 && out.tracked.effort >= least_effort_with_groups)
+        out.tracked.group = largest_group(out);
     if (!given(request, "session") && request.job.of == 0 && output.may_be_live()) out.session = random_session();
     // A key picture takes as many bits as a second of others.
     constexpr int frames_between_key_pictures = 90;

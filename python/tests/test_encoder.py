@@ -45,14 +45,14 @@ def test_options_have_their_names_with_underscores_for_dots():
 
 @needs_program
 @pytest.mark.parametrize("quality", [None, 60])
-def test_defaults_make_the_file_of_the_command_line(tmp_path, quality):
+def test_defaults_make_the_file_of_the_command_line_without_groups(tmp_path, quality):
     asked = [] if quality is None else ["-q", str(quality)]
     with htvm.Encoder(tmp_path / "python.htvm", quality=quality) as encoder:
         for number in range(6):
             htvm.write_mesh(tmp_path / f"{number}.ply", sheet(number), unit="mm")
             encoder.push(sheet(number))
     subprocess.run([program, "encode", *(tmp_path / f"{number}.ply" for number in range(6)), "--unit", "mm", *asked,
-                    "-o", tmp_path / "program.htvm", "--quiet"], check=True)
+                    "--group", "1", "-o", tmp_path / "program.htvm", "--quiet"], check=True)
     assert (tmp_path / "python.htvm").read_bytes() == (tmp_path / "program.htvm").read_bytes()
 
 

@@ -75,7 +75,7 @@ encode --frames 1 -o y.htvm
 cmp -s x.htvm y.htvm || fail "one frame in chunks is not the frame"
 
 # What is told of the whole.
-"$htvm" encode capture --chunks 3 --json -o x.htvm >report.json 2>/dev/null
+"$htvm" encode capture --chunks 3 --group 1 --json -o x.htvm >report.json 2>/dev/null
 python3 - <<'PYTHON' || fail "the report is not that of all chunks"
 import json, os
 report = json.load(open("report.json"))

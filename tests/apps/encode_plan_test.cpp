@@ -299,11 +299,33 @@ TEST(EncodePlan, FramesOfAFileMayWaitAndOthersMayNot) {
 }
 
 TEST(EncodePlan, GroupsOfFramesAreForFilesAlone) {
-    EXPECT_EQ(plan(usual()).encoder.tracked.group, 0);  // by the effort
+    EXPECT_EQ(plan(usual()).encoder.tracked.group, 8);
     EXPECT_EQ(plan(to_hub()).encoder.tracked.group, 1);
+    EXPECT_EQ(plan(piped()).encoder.tracked.group, 0) << "by the effort";
     auto request = usual();
     request.repeat_efforts = "efforts.csv";
     EXPECT_EQ(plan(request).encoder.tracked.group, 1);
+    request = usual();
+    request.output = "-";
+    EXPECT_EQ(plan(request).encoder.tracked.group, 8) << "the same stream as in a file";
+}
+
+TEST(EncodePlan, FilesAreInGroupsWhereTheyMayBeAndTimeIsNotWorthMoreThanBits) {
+    const auto group_with = [](const char* option, double value) {
+        auto request = usual();
+        give(request, option, value);
+        return plan(request).encoder.tracked.group;
+    };
+    EXPECT_EQ(group_with("tracked.effort", 3), 8);
+    EXPECT_EQ(group_with("tracked.effort", 2), 0);
+    EXPECT_EQ(group_with("tracked.group", 1), 1);
+    EXPECT_EQ(group_with("tracked.group", 4), 4);
+    EXPECT_EQ(group_with("rate.bits_per_second", 1e6), 0);
+    EXPECT_EQ(group_with("rate.target_error", 0.5), 0);
+    EXPECT_EQ(group_with("key_interval", 1), 0);
+    auto by_bones = usual();
+    by_bones.encoding.profile = Profile::topology;
+    EXPECT_EQ(plan(by_bones).encoder.tracked.group, 0);
 }
 
 TEST(EncodePlan, WhatMayBeLiveHasASessionOfItsOwn) {

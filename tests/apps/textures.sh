@@ -97,7 +97,7 @@ if command -v ffmpeg >/dev/null; then
         "$htvm" encode meshes --texture clip.mp4 $options -o video.htvm --quiet || fail "a video with '$options'"
         cmp -s images.htvm video.htvm || fail "a video gives another stream than its pictures, with '$options'"
     done
-    "$htvm" encode walk -o images.htvm --quiet
+    "$htvm" encode walk --group 1 -o images.htvm --quiet
     cat meshes/*.ply | "$htvm" encode - --texture clip.mp4 -o video.htvm --quiet
     cmp -s images.htvm video.htvm || fail "a video with meshes from standard input gives another stream"
     "$htvm" still walk --frame 7 -o images.png --quiet
