@@ -3,6 +3,9 @@
 find_package(GTest QUIET)
 if(NOT TARGET GTest::gmock AND NOT GTest_FOUND)
   # For other systems there is none built; Debian's googletest has its sources.
+  if(NOT EXISTS /usr/src/googletest)
+    message(FATAL_ERROR "The tests need GoogleTest; HTVM_BUILD_TESTS=OFF leaves them out")
+  endif()
   set(INSTALL_GTEST OFF)
   add_subdirectory(/usr/src/googletest ${PROJECT_BINARY_DIR}/googletest EXCLUDE_FROM_ALL SYSTEM)
 endif()

@@ -11,7 +11,7 @@ git archive --prefix="htvm-$version/" HEAD | tar x -C "$out"
 # Of the same bytes whenever it is made.
 stamp=$(git log -1 --format=%ct)
 tar c --sort=name --mtime="@$stamp" --owner=0 --group=0 --numeric-owner -C "$out" "htvm-$version" |
-    xz -6 -T1 >"$out/htvm_$version.orig.tar.xz"
+    gzip -9n >"$out/htvm_$version.orig.tar.gz"
 cp -r packaging/debian "$out/htvm-$version/debian"
 (cd "$out" && dpkg-source -b "htvm-$version" >/dev/null)
 rm -rf "$out/htvm-$version"
