@@ -35,7 +35,7 @@ encoded=("${encoded[@]/#/$streams/}")
 # exports LIBRARY: the names that it gives to programs.
 exports() {
     case $1 in
-        *.dll) x86_64-w64-mingw32-objdump -p "$1" | awk '/\[Ordinal\/Name Pointer\]/ { on = 1; next } on && /\[/ { print $NF } on && !NF { exit }' ;;
+        *.dll) x86_64-w64-mingw32-objdump -p "$1" | awk '/\[Ordinal\/Name Pointer\]/ { on = 1; next } on && /\[/ { print $NF } !NF { on = 0 }' ;;
         *) aarch64-linux-gnu-nm -D --defined-only "$1" | awk '{ print $3 }' ;;
     esac | LC_ALL=C sort
 }
