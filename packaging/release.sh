@@ -13,6 +13,7 @@ cd "$(dirname "$0")/.."
 git diff --quiet HEAD || echo "Warning: what is not committed is not in the source archives" >&2
 version=$(grep -oE 'HTVM_VERSION_(MAJOR|MINOR|PATCH) [0-9]+' include/htvm/htvm.h | cut -d' ' -f2 | paste -sd.)
 stamp=$(git log -1 --format=%ct)
+export SOURCE_DATE_EPOCH=$stamp # what DLLs say when they were linked or stripped
 missing() { echo "left out: $1 ($2 makes it)"; }
 
 # pack NAME FOLDER: an archive of the folder's files, the same bytes whenever it is made.
