@@ -65,7 +65,7 @@ offers() {
     checks=$((checks + 1))
 }
 offers 'calibrate|check|compare|cut|decode|demo|encode|help|index|info|join|link|play|publish|render|serve|still|synth|verify' 'htvm '
-offers 'decode' 'htvm d'
+offers 'decode' 'htvm dec'
 offers '--help|--version' 'htvm --'
 offers 'paper|topology|tracked' 'htvm encode capture --profile '
 offers 'topology' 'htvm encode capture --profile to'
@@ -85,7 +85,7 @@ if command -v fish >/dev/null; then
     for program in htvm htvm-lab; do fish --no-execute fish/$program.fish || fail "fish/$program.fish"; done
     offered() { fish --no-config -c "source fish/htvm.fish; complete -C '$1'" | cut -f1 | LC_ALL=C sort | paste -sd '|'; }
     [ "$(offered 'htvm encode --profile ')" = 'paper|topology|tracked' ] || fail "fish offers $(offered 'htvm encode --profile ')"
-    [ "$(offered 'htvm d')" = 'decode' ] || fail "fish offers $(offered 'htvm d')"
+    [ "$(offered 'htvm dec')" = 'decode' ] || fail "fish offers $(offered 'htvm dec')"
     [ "$(offered 'htvm encode --quali')" = '--quality' ] || fail "fish offers $(offered 'htvm encode --quali')"
 else
     echo "fish is not installed: its completions are not tried"
