@@ -13,8 +13,10 @@ foreach(library ${htvm_libraries})
   else()
     set(runtime runtime)
   endif()
-  foreach(kind ${htvm_kinds})
+  get_property(kinds GLOBAL PROPERTY htvm_kinds_of_${library})
+  foreach(kind ${kinds})
     install(TARGETS htvm_${library}_${kind} EXPORT htvm-${library}-${kind}
+            RUNTIME COMPONENT ${runtime}
             ARCHIVE COMPONENT development
             LIBRARY COMPONENT ${runtime} NAMELINK_COMPONENT development)
     install(EXPORT htvm-${library}-${kind} NAMESPACE htvm:: DESTINATION ${htvm_cmake_folder} COMPONENT development)

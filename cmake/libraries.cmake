@@ -31,7 +31,13 @@ function(htvm_library name)
     target_compile_options(htvm_${floor} PRIVATE -fno-semantic-interposition)
     list(APPEND objects $<TARGET_OBJECTS:htvm_${floor}>)
   endforeach()
-  foreach(kind ${htvm_kinds})
+  # DLLs of C++ would export every symbol, and have no place for the standard library that they share: on Windows the
+  # libraries for C++ are static ones.
+  set(kinds ${htvm_kinds})
+  if(WIN32 AND NOT library_C)
+    set(kinds static)
+  endif()
+  foreach(kind ${kinds})
     set(target htvm_${name}_${kind})
     string(TOUPPER ${kind} type)
     add_library(${target} ${type} ${objects})
@@ -41,7 +47,8 @@ function(htvm_library name)
     set_target_properties(${target} PROPERTIES
       OUTPUT_NAME htvm_${name} EXPORT_NAME ${name} LINKER_LANGUAGE CXX
       VERSION ${PROJECT_VERSION} SOVERSION ${htvm_soversion}
-      ARCHIVE_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
+      ARCHIVE_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib
+      RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
     target_include_directories(${target} INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
                                                    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
     if(NOT library_C)
@@ -65,9 +72,10 @@ function(htvm_library name)
       endif()
     endif()
   endforeach()
-  list(GET htvm_kinds 0 kind)
+  list(GET kinds 0 kind)
   add_library(htvm::${name} ALIAS htvm_${name}_${kind})
   set_property(GLOBAL APPEND PROPERTY htvm_libraries ${name})
+  set_property(GLOBAL PROPERTY htvm_kinds_of_${name} ${kinds})
 endfunction()
 
 htvm_library(decoder FLOORS core entropy decoder)

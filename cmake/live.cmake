@@ -40,9 +40,8 @@ endif()
 set(number 0)
 foreach(path ${player_paths})
   cmake_path(GET path FILENAME name)
-  string(APPEND player_blobs "extern \"C\" const char player_file_${number}[], player_file_${number}_end[];\n"
-    "__asm__(\".section .rodata\\n.global player_file_${number}, player_file_${number}_end\\n\"\n"
-    "        \"player_file_${number}:\\n.incbin \\\"${path}\\\"\\nplayer_file_${number}_end:\\n.byte 0\\n.previous\");\n")
+  htvm_embed(blob player_file_${number} ${path})
+  string(APPEND player_blobs "${blob}")
   string(APPEND player_list
     "    {\"${name}\", {player_file_${number}, static_cast<std::size_t>(player_file_${number}_end - player_file_${number})}},\n")
   math(EXPR number "${number} + 1")

@@ -1,5 +1,4 @@
 # The libraries that the programs use besides the codec.
-find_package(nlohmann_json 3.10 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(PNG REQUIRED)
@@ -11,28 +10,13 @@ add_library(htvm_image_formats INTERFACE)
 target_include_directories(htvm_image_formats SYSTEM INTERFACE ${TURBOJPEG_INCLUDE} ${WEBP_INCLUDE})
 target_link_libraries(htvm_image_formats INTERFACE PNG::PNG ${TURBOJPEG_LIBRARY} ${WEBP_LIBRARY})
 find_package(embree 3 REQUIRED)
-find_path(DRACO_INCLUDE draco/compression/encode.h REQUIRED)
-find_library(DRACO_LIBRARY draco REQUIRED)
-add_library(htvm_libdraco INTERFACE)
-target_include_directories(htvm_libdraco SYSTEM INTERFACE ${DRACO_INCLUDE})
-target_link_libraries(htvm_libdraco INTERFACE ${DRACO_LIBRARY})
 
-# Images and textures are apart, so that the Python library, which reads meshes alone, needs none of their libraries.
-file(GLOB io_sources CONFIGURE_DEPENDS src/io/*.cpp)
-set(image_sources ${io_sources})
-list(FILTER image_sources INCLUDE REGEX "/(image|texture)_[a-z]*\\.cpp$")
-list(FILTER io_sources EXCLUDE REGEX "/(image|texture)_[a-z]*\\.cpp$")
-htvm_floor(io SOURCES ${io_sources} LINKS htvm_core htvm_libdraco nlohmann_json::nlohmann_json)
+file(GLOB image_sources CONFIGURE_DEPENDS src/io/image_*.cpp src/io/texture_*.cpp)
 htvm_floor(images SOURCES ${image_sources} LINKS htvm_io htvm_image_formats)
 # Sound, likewise.
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(HTVM_SOUND_FORMATS REQUIRED IMPORTED_TARGET opus sndfile samplerate)
 htvm_floor(sound DIRECTORY src/sound LINKS htvm_decoder htvm_io PkgConfig::HTVM_SOUND_FORMATS)
-htvm_floor(synth DIRECTORY src/synth LINKS htvm_core Eigen3::Eigen)
-# It reads no input, and makes what other tests need: with sanitizers it would take half of their time.
-if(HTVM_SANITIZE MATCHES "address")
-  target_compile_options(htvm_synth PRIVATE -fno-sanitize=all -O2)
-endif()
 # Above the encoder's surface: pictures of a capture's texture in the layout of a stream's charts.
 htvm_floor(texture_baking SOURCES src/texture/texture_baking.cpp LINKS htvm_core htvm_surface)
 htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
@@ -63,8 +47,27 @@ function(htvm_program_library name folder)
 endfunction()
 htvm_program_library(command_line command_line htvm_core htvm_io htvm_images htvm_metrics CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
 target_compile_definitions(htvm_command_line PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
+include(cmake/embed.cmake)
 include(cmake/live.cmake)
 htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_sound htvm_texture htvm_texture_baking htvm_synth htvm_metrics htvm_live)
+# The stream of `htvm demo`: apps/htvm/demo/make.sh made it.
+set(demo_stream ${PROJECT_SOURCE_DIR}/apps/htvm/demo/person.htvm)
+set(demo_cpp ${PROJECT_BINARY_DIR}/demo/demo_stream.cpp)
+htvm_embed(demo_blob demo_person ${demo_stream})
+file(CONFIGURE OUTPUT ${demo_cpp} CONTENT "// Written by cmake/tools.cmake.
+#include \"demo_stream.h\"
+
+@demo_blob@
+namespace htvm::app {
+
+std::span<const std::uint8_t> demo_stream() {
+    return {reinterpret_cast<const std::uint8_t*>(demo_person), static_cast<std::size_t>(demo_person_end - demo_person)};
+}
+
+}  // namespace htvm::app
+" @ONLY)
+set_source_files_properties(${demo_cpp} PROPERTIES OBJECT_DEPENDS ${demo_stream})
+target_sources(htvm_app PRIVATE ${demo_cpp})
 htvm_program_library(laboratory lab htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_texture htvm_texture_baking htvm_synth htvm_metrics)
 add_executable(htvm apps/htvm/main.cpp)
 target_link_libraries(htvm PRIVATE htvm_app)

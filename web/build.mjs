@@ -35,6 +35,26 @@ await build({
     ...whole, format: 'iife', entryPoints: from('player', 'worker'), outfile: to('player', 'htvm-worker'),
     banner: { js: '/*! htvm player, Apache-2.0 */' }, logOverride: { 'empty-import-meta': 'silent' },
 });
+// The same with worker and decoder inside, for pages that can have one file only.
+const inside = `
+    import { HtvmPlayerElement } from ${JSON.stringify(`${folder}packages/player/src/element.ts`)};
+    const address = (part, type) => URL.createObjectURL(new Blob([part], { type }));
+    HtvmPlayerElement.workerUrl = address(${JSON.stringify(await readFile('packages/player/dist/htvm-worker.js', 'utf8'))}, 'text/javascript');
+    const decoder = atob('${(await readFile(wasm)).toString('base64')}');
+    HtvmPlayerElement.decoderUrl = address(Uint8Array.from(decoder, (letter) => letter.charCodeAt(0)), 'application/wasm');
+`;
+await build({
+    ...whole, outfile: to('player', 'htvm-player-single'), banner: { js: notice },
+    // The element looks for its files once it is defined, by index.ts, which comes second.
+    stdin: { contents: `import 'inside'; export * from './packages/player/src/index.ts';`, resolveDir: folder },
+    plugins: [{
+        name: 'inside',
+        setup: (bundle) => {
+            bundle.onResolve({ filter: /^inside$/ }, () => ({ path: 'inside', namespace: 'inside' }));
+            bundle.onLoad({ filter: /.*/, namespace: 'inside' }, () => ({ contents: inside, loader: 'js', resolveDir: folder }));
+        },
+    }],
+});
 await copyFile(wasm, 'packages/decoder/dist/htvm_decoder.wasm');
 await copyFile(wasm, 'packages/player/dist/htvm_decoder.wasm');
 const licence = async (title, path) => `${title}\n${'='.repeat(title.length)}\n\n${(await readFile(path, 'utf8')).trim()}\n`;

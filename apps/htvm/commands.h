@@ -10,6 +10,7 @@ void add_check(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_cut(CLI::App& app, Run& run);
 void add_decode(CLI::App& app, Run& run);
+void add_demo(CLI::App& app, Run& run);
 void add_encode(CLI::App& app, Run& run);
 void add_index(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);

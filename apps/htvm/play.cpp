@@ -1,4 +1,5 @@
 // htvm play: a stream or a capture in a web browser, by the server and the player that the program carries inside.
+// htvm demo: the same of a stream that the program carries inside, too.
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -13,9 +14,11 @@
 
 #include "command_line/terminal.h"
 #include "commands.h"
+#include "demo_stream.h"
 #include "encode.h"
 #include "io/child_program.h"
 #include "io/number_text.h"
+#include "io/output_file.h"
 #include "io/recording.h"
 #include "live/server/player_files.h"
 #include "live/server/server.h"
@@ -193,6 +196,28 @@ Result<void> play(const PlayOptions& options) {
     return {};
 }
 
+struct DemoOptions {
+    std::string output;  // empty: played
+    PlayOptions playing;
+};
+
+Result<void> demo(const DemoOptions& options) {
+    if (!options.output.empty()) return write_file(options.output, demo_stream());
+    TemporaryFolder folder;
+    if (!folder.make()) return fail(ErrorKind::bad_input, "there is no place for a temporary file (TMPDIR)");
+    auto playing = options.playing;
+    playing.inputs = {(folder.path / "demo.htvm").string()};
+    if (auto written = write_file(playing.inputs[0], demo_stream()); !written) return written;
+    return play(playing);
+}
+
+// What playing a capture and the stream inside have in common.
+void add_place(CLI::App& command, PlayOptions& options) {
+    command.add_option("--port", options.port, "Port on this machine's loopback address (default: a free one)")
+        ->check(CLI::Range(0, 65535));
+    command.add_flag("--no-open", options.no_open, "Print the address, but do not open a browser");
+}
+
 }  // namespace
 
 void add_play(CLI::App& app, Run& run) {
@@ -224,9 +249,7 @@ void add_play(CLI::App& app, Run& run) {
                      fmt::format("Of a capture: quality, 0 to 100 (default {:g})", default_quality))
         ->check(CLI::Range(0.0, 100.0))
         ->excludes(beside);
-    command->add_option("--port", options->port, "Port on this machine's loopback address (default: a free one)")
-        ->check(CLI::Range(0, 65535));
-    command->add_flag("--no-open", options->no_open, "Print the address, but do not open a browser");
+    add_place(*command, *options);
     command->footer(
         "Prints the address to open and runs until Ctrl-C. Only this machine can reach it.\n"
         "Examples:\n"
@@ -234,6 +257,20 @@ void add_play(CLI::App& app, Run& run) {
         "  htvm play capture/ --frames 50 --orbit 180\n"
         "  htvm play capture/ --beside person.htvm");
     command->callback([options, &run] { run = [options] { return play(*options); }; });
+}
+
+void add_demo(CLI::App& app, Run& run) {
+    auto options = std::make_shared<DemoOptions>();
+    auto* command = app.add_subcommand("demo", "Look at a short stream that is inside the program, in a web browser");
+    command->add_option("-o,--output", options->output, "Write the stream to this file, and do not play it")
+        ->type_name("FILE.htvm");
+    add_place(*command, options->playing);
+    command->footer(
+        "A synthetic person. Prints the address to open and runs until Ctrl-C. Only this machine can reach it.\n"
+        "Examples:\n"
+        "  htvm demo\n"
+        "  htvm demo -o person.htvm");
+    command->callback([options, &run] { run = [options] { return demo(*options); }; });
 }
 
 }  // namespace htvm::app

@@ -274,13 +274,14 @@ functions: dict[str, tuple[Any, list[Any]]] = {
 
 def load() -> Any:
     """The library in this folder, as wheels have it, or the one that HTVM_LIBRARY names."""
-    path = os.environ.get("HTVM_LIBRARY") or str(Path(__file__).with_name("libhtvm.so"))
+    inside = Path(__file__).with_name("htvm.dll" if sys.platform == "win32" else "libhtvm.so")
+    path = os.environ.get("HTVM_LIBRARY") or str(inside)
     try:
         library = ctypes.CDLL(path)
     except OSError as error:
         raise ImportError(
             f"htvm's library cannot be loaded ({error}). Install the wheel, or set HTVM_LIBRARY to the path of "
-            f"libhtvm.so; {sys.platform} needs one built for it") from error
+            f"{inside.name}; {sys.platform} needs one built for it") from error
     for name, (result, parameters) in functions.items():
         function = getattr(library, name)
         function.restype = result

@@ -13,7 +13,7 @@ cd "$work"
 fail() { echo "FAILED: $*"; exit 1; }
 
 wheel=$(/usr/bin/python3 "$project/python/htvm_wheel.py" "$library" "$work")
-[[ $wheel == htvm-*-py3-none-linux_*.whl ]] || fail "the wheel's name is $wheel"
+[[ $wheel == htvm-*-py3-none-manylinux_2_*_"$(uname -m)".whl ]] || fail "the wheel's name is $wheel"
 /usr/bin/python3 -m venv --system-site-packages environment
 environment/bin/pip install -q --no-index --no-deps "$wheel"
 where=$(environment/bin/python -c 'import htvm; print(htvm.__file__)')

@@ -244,6 +244,10 @@ expect 2 "did you mean 'encode'?" "$htvm" help encod
 expect 2 "sideways is not a number" "$htvm" play a.htvm --orbit sideways
 expect 2 "a distance above 0" "$htvm" play a.htvm --orbit "0 0 0"
 expect 2 "excludes" "$htvm" play capture -q 20 --beside a.htvm
+# The stream that the program carries inside is short, small and whole.
+expect 0 "" "$htvm" demo -o demo.htvm
+[ "$(wc -c <demo.htvm)" -lt 300000 ] || fail "the stream of htvm demo is $(wc -c <demo.htvm) bytes"
+expect 0 "150 frames" "$htvm" verify demo.htvm
 for command in synth encode decode info calibrate compare; do expect 0 "Usage" "$htvm" $command --help; done
 
 done_with "the command line does what it should"

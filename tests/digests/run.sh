@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # Same bits everywhere: builds the decoder by several compilers and for several machines, decodes the conformance
 # streams with each and compares every frame with the stored digests. Prints a table; fails unless all agree.
-#   tests/digests/run.sh [BUILD...]    BUILD: gcc-O0, gcc-O3-native, clang-O2, gcc-O2-32bit, wasm-O2; default all
+#   tests/digests/run.sh [BUILD...]    BUILD: gcc-O0, gcc-O3-native, clang-O2, gcc-O2-32bit, wasm-O2; aarch64 (by qemu) and
+#                                      windows (by Wine), built by CMake in build/aarch64 and build/windows; default all
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 builds=("$@")
-[ $# -gt 0 ] || builds=(gcc-O0 gcc-O3-native clang-O2 gcc-O2-32bit wasm-O2)
+[ $# -gt 0 ] || builds=(gcc-O0 gcc-O3-native clang-O2 gcc-O2-32bit wasm-O2 aarch64 windows)
 streams=tests/data/conformance
 out=build/digests
 failures=0
@@ -32,12 +33,24 @@ run() {
     fi
 }
 
-# build TARGET: prints how long it took.
+# build NAME: prints how long it took.
 build() {
-    local begin
+    local name=$1 begin
     begin=$(date +%s.%N)
-    ninja -f $out/build.ninja "$1" >$out/log || { cat $out/log >&2; return 1; }
+    case $name in
+        aarch64 | windows)
+            { tests/platforms/configure.sh $name && cmake --build build/$name --target digests; } >$out/log 2>&1 ;;
+        *) ninja -f $out/build.ninja $out/$name/digests >$out/log ;;
+    esac || { cat $out/log >&2; return 1; }
     seconds "$begin"
+}
+
+# program NAME: the words that start what was built.
+program() {
+    case $1 in
+        aarch64 | windows) echo tests/platforms/emulate.sh "$1" "build/$1/digests" ;;
+        *) echo "$out/$1/digests" ;;
+    esac
 }
 
 # refused NAME COMMAND...: a build that must fail, because it would decode to different bits.
@@ -59,15 +72,17 @@ tests/digests/ninja_file.sh >$out/build.ninja
 
 row build "build, s" "decode, s" threads frames "digest of all"
 for name in "${builds[@]}"; do
-    if ! built=$(build $out/$name/digests); then
+    if ! built=$(build $name); then
         row $name "" "" "" "" "FAILED to build"
         failures=$((failures + 1))
     elif [[ $name = wasm-* ]]; then
         run $name "$built" none node --no-warnings tests/wasm/digests.mjs $out/$name/digests $streams \
             $(cd $streams && ls ./*.htvm)
     else
-        run $name "$built" 1 $out/$name/digests 1 $streams/*.htvm
-        run $name "" 4 $out/$name/digests 4 $streams/*.htvm
+        # shellcheck disable=SC2046
+        run $name "$built" 1 $(program $name) 1 $streams/*.htvm
+        # shellcheck disable=SC2046
+        run $name "" 4 $(program $name) 4 $streams/*.htvm
     fi
 done
 source=src/core/crc32.cpp
@@ -78,7 +93,8 @@ refused "-ffp-contract=fast" "CMAKE_CXX_FLAGS has -ffp-contract=fast" cmake -S .
 
 if [ "$(printf '%s\n' "${digests[@]}" | sort -u | wc -l)" -ne 1 ] || [ $failures -gt 0 ]; then
     for name in "${builds[@]}"; do
-        [[ $name = wasm-* ]] || $out/$name/digests 1 $streams/*.htvm || true # what disagrees
+        # shellcheck disable=SC2046
+        [[ $name = wasm-* ]] || $(program $name) 1 $streams/*.htvm || true # what disagrees
     done
     echo "FAILED: the builds do not agree"
     exit 1

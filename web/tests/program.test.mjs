@@ -70,6 +70,13 @@ test('htvm play shows a stream, in a loop, in the whole window', options, () =>
         assert.equal(await page.evaluate(() => document.querySelector('htvm-player').paused), true);
     }));
 
+test('htvm demo shows the stream that is inside the program', options, () =>
+    running(['demo', '--no-open'], async (page, address) => {
+        await page.goto(address);
+        await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 3);
+        assert.equal(await page.title(), 'demo – htvm');
+    }));
+
 test('htvm play --orbit says where the stream is seen from', options, () =>
     running(['play', '--no-open', join(work, 'streams', 'tracked.htvm'), '--orbit', '180, 20'], async (page, address) => {
         await page.goto(address);

@@ -1,0 +1,31 @@
+# src/io: mesh and skeleton files, for the programs and for the Python package. Draco's files need libdraco, which the
+# programs use for more; the Python package reads all but those without it.
+find_package(nlohmann_json 3.10 REQUIRED)
+find_path(DRACO_INCLUDE draco/compression/encode.h)
+find_library(DRACO_LIBRARY draco)
+set(draco_found OFF)
+if(DRACO_INCLUDE AND DRACO_LIBRARY)
+  set(draco_found ON)
+endif()
+set(HTVM_DRACO ${draco_found} CACHE BOOL "Read Draco files (needs libdraco)")
+if(HTVM_DRACO AND NOT draco_found)
+  message(FATAL_ERROR "HTVM_DRACO: libdraco is not there")
+elseif(HTVM_BUILD_TOOLS AND NOT HTVM_DRACO)
+  message(FATAL_ERROR "The programs need Draco (libdraco-dev); HTVM_BUILD_TOOLS=OFF builds the libraries alone")
+endif()
+
+# Images and textures are apart (cmake/tools.cmake), so that the Python library, which reads meshes alone, needs none of
+# their libraries.
+file(GLOB io_sources CONFIGURE_DEPENDS src/io/*.cpp)
+list(FILTER io_sources EXCLUDE REGEX "/(image|texture)_[a-z]*\\.cpp$")
+if(HTVM_DRACO)
+  add_library(htvm_libdraco INTERFACE)
+  target_include_directories(htvm_libdraco SYSTEM INTERFACE ${DRACO_INCLUDE})
+  target_link_libraries(htvm_libdraco INTERFACE ${DRACO_LIBRARY})
+  list(FILTER io_sources EXCLUDE REGEX "/draco_geometry_absent\\.cpp$")
+  set(io_needs htvm_libdraco)
+else()
+  list(FILTER io_sources EXCLUDE REGEX "/draco_geometry\\.cpp$")
+  set(io_needs "")
+endif()
+htvm_floor(io SOURCES ${io_sources} LINKS htvm_core ${io_needs} nlohmann_json::nlohmann_json)
