@@ -227,8 +227,8 @@ std::string other_kind_of(const std::filesystem::path& path) {
 Result<PacketSource> packets_in(const std::filesystem::path& path) {
     auto file = std::make_shared<std::ifstream>(path, std::ios::binary);
     if (!*file) return fail(ErrorKind::bad_input, path.string() + " cannot be read again");
-    return PacketSource([file, reader = std::make_shared<PacketReader>()]() -> std::optional<Packet> {
-        std::vector<char> buffer(std::size_t{1} << 20);
+    return PacketSource([file, reader = std::make_shared<PacketReader>(),
+                         buffer = std::vector<char>(std::size_t{1} << 20)]() mutable -> std::optional<Packet> {
         for (;;) {
             if (auto packet = reader->pull()) return packet;
             file->read(buffer.data(), static_cast<std::streamsize>(buffer.size()));

@@ -71,8 +71,8 @@ Result<void> check_whole(const StreamInput& input, const std::string& path,
                          const std::string& advice = "'htvm verify' tells more");
 
 // A file is there once it is finished: until then its packets are in a file beside it, and what was there before stays.
-// It then begins with an index; those at the end of streams are left out of it. An .mp4, or segments and their playlist,
-// are made of these packets at the end. To a hub, packets go at once.
+// It then begins with an index; those at the end of streams are left out of it. An .mp4, or segments and their
+// playlist, are made of these packets at the end. To a hub, packets go at once.
 class StreamOutput {
 public:
     // "-" is standard output, ws:// and wss:// a hub.
@@ -112,7 +112,7 @@ private:
     Result<void> write_one(const Packet& packet);
     Result<void> finish_mp4(const StreamIndex& index);
     Result<void> finish_segments(const StreamIndex& index);
-    std::string playlist_;              // of the segments that file_ becomes; empty: it becomes none
+    std::string playlist_;           // of the segments that file_ becomes; empty: it becomes none
     std::optional<OutputFile> mp4_;  // where file_ becomes one
     Mp4Options mp4_options_;
     std::optional<OutputFile> file_;  // none: standard output, or a hub

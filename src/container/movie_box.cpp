@@ -395,9 +395,9 @@ void write_access_groups(BoxWriter& out, std::span<const std::optional<std::vect
 std::vector<std::uint8_t> write_movie(const Movie& movie) {
     BoxWriter out;
     out.begin(four("ftyp"));
-    out.text("iso6");
-    out.u32(1);
-    out.text("iso6isommp41htvm");
+    out.text("isom");  // as some tools take no others
+    out.u32(0x200);
+    out.text("isomiso6mp41htvm");
     if (movie.has(SampleTrack::pictures) && movie.entries.pictures[0].coder == PictureCoder::av1) out.text("av01");
     out.end();
     out.begin(four("moov"));

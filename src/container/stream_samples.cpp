@@ -120,7 +120,9 @@ bool StreamSampler::add_picture(const Packet& packet, std::span<const std::uint8
 // The same of sound.
 bool StreamSampler::add_sound(const Packet& packet, std::span<const std::uint8_t> whole) {
     const auto audio = read_audio(packet);
-    if (!has_frame_ || !audio) return false;
+    // Sound of the time before a frame may lie between the header that comes with that frame and the frame.
+    const bool after_any_frame = has_frame_ || samples_ > 1;
+    if (!after_any_frame || !audio) return false;
     // Sizes may be written longer than they need be, and bytes may lie behind the last.
     if (write_audio(*audio, packet.frame, packet.timestamp_us).payload != packet.payload) return false;
     const auto entry = place_of(entries_.sound, {audio->channels, audio->gain, audio->skip_begin});
@@ -128,7 +130,8 @@ bool StreamSampler::add_sound(const Packet& packet, std::span<const std::uint8_t
     constexpr std::int64_t farthest_us = std::int64_t{1} << 40;
     const auto behind = static_cast<double>(packet.timestamp_us) - static_cast<double>(frame_timestamp_us_);
     if (behind < -static_cast<double>(farthest_us) || behind > static_cast<double>(farthest_us)) return false;
-    const auto begin_us = sample_->mesh().time + (packet.timestamp_us - frame_timestamp_us_);
+    const auto begin_us =
+        static_cast<std::int64_t>(time_.microseconds()) + (packet.timestamp_us - frame_timestamp_us_);
     auto time = begin_us * 48 / 1000;
     constexpr std::int64_t rounded = audio_samples_per_second / 1000;
     if (sound_end_ && time < *sound_end_ + rounded) time = *sound_end_;
