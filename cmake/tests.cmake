@@ -74,6 +74,11 @@ if(TARGET htvm_python)
   add_test(NAME python COMMAND ${PROJECT_SOURCE_DIR}/python/tests/run.sh $<TARGET_FILE:htvm_python> $<TARGET_FILE:htvm>)
   set_tests_properties(python PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77)
 endif()
+# What viewers behind a cache cost: examples/cdn with a real nginx.
+if(NOT HTVM_SANITIZE)
+  add_test(NAME cdn COMMAND ${PROJECT_SOURCE_DIR}/tests/cdn/edge.py $<TARGET_FILE:htvm> 100)
+  set_tests_properties(cdn PROPERTIES TIMEOUT 180 SKIP_RETURN_CODE 77 RUN_SERIAL ON)
+endif()
 # Compares formats, in Python: sanitizers would only make it slow.
 if(NOT HTVM_SANITIZE)
   add_test(NAME second_decoder COMMAND ${PROJECT_SOURCE_DIR}/tests/second_decoder/check.sh $<TARGET_FILE:htvm>)
