@@ -6,8 +6,6 @@
 #include <cstdio>
 #include <optional>
 
-#include "core/crc32.h"
-
 namespace htvm {
 namespace {
 
@@ -162,9 +160,14 @@ bool is_name_below(std::string_view uri) {
 }
 
 std::string name_by_content(std::span<const std::uint8_t> bytes) {
-    std::uint64_t hash = 0xcbf29ce484222325;  // FNV-1a
-    for (const auto byte : bytes) hash = (hash ^ byte) * 0x100000001b3;
-    return hexadecimal(hash, 16) + hexadecimal(internal::crc32(bytes), 8);
+    // FNV-1a, and a second hash of another kind. A CRC-32 would be the same for all that ends with its own, as maps do.
+    std::uint64_t hash = 0xcbf29ce484222325, other = bytes.size();
+    for (const auto byte : bytes) {
+        hash = (hash ^ byte) * 0x100000001b3;
+        other = (other + byte + 1) * 0x9e3779b97f4a7c15;
+        other ^= other >> 29;
+    }
+    return hexadecimal(hash, 16) + hexadecimal(other >> 32, 8);
 }
 
 }  // namespace htvm

@@ -68,7 +68,15 @@ std::optional<StreamSample> StreamSampler::push(Packet packet) {
     if (packet.kind == PacketKind::sequence) {
         const auto version =
             packet.payload.size() < 6 ? 0u : unsigned{packet.payload[4]} | unsigned{packet.payload[5]} << 8;
-        mesh_entry_ = place_of(entries_.meshes, {whole, static_cast<std::uint16_t>(version)});
+        // One that is repeated differs in the number of the frame that it comes with, and says the same.
+        const auto same = std::find_if(entries_.meshes.begin(), entries_.meshes.end(), [&](const MeshEntry& entry) {
+            return entry.header.size() == whole.size() &&
+                   std::equal(packet.payload.begin(), packet.payload.end(), entry.header.begin() + packet_header_bytes);
+        });
+        if (same != entries_.meshes.end())
+            mesh_entry_ = static_cast<std::uint16_t>(same - entries_.meshes.begin());
+        else
+            mesh_entry_ = place_of(entries_.meshes, {whole, static_cast<std::uint16_t>(version)});
     }
     if (frame_type(packet.kind)) add_frame(packet);
     const bool elsewhere = (packet.kind == PacketKind::texture && add_picture(packet, whole)) ||
@@ -130,8 +138,7 @@ bool StreamSampler::add_sound(const Packet& packet, std::span<const std::uint8_t
     constexpr std::int64_t farthest_us = std::int64_t{1} << 40;
     const auto behind = static_cast<double>(packet.timestamp_us) - static_cast<double>(frame_timestamp_us_);
     if (behind < -static_cast<double>(farthest_us) || behind > static_cast<double>(farthest_us)) return false;
-    const auto begin_us =
-        static_cast<std::int64_t>(time_.microseconds()) + (packet.timestamp_us - frame_timestamp_us_);
+    const auto begin_us = static_cast<std::int64_t>(time_.microseconds()) + (packet.timestamp_us - frame_timestamp_us_);
     auto time = begin_us * 48 / 1000;
     constexpr std::int64_t rounded = audio_samples_per_second / 1000;
     if (sound_end_ && time < *sound_end_ + rounded) time = *sound_end_;
