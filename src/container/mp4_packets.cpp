@@ -4,6 +4,7 @@
 
 #include "core/bytes.h"
 #include "core/crc32.h"
+#include "htvm/decoder.hpp"
 #include "htvm/packet.hpp"
 
 namespace htvm {
@@ -58,6 +59,8 @@ std::optional<std::vector<std::uint8_t>> Mp4Packets::next() {
 // The packets of the sample, of which some lie in part in other tracks.
 Mp4Packets::Rebuilt Mp4Packets::rebuilt(std::span<const std::uint8_t> sample) {
     Rebuilt out;
+    // Who begins in the middle has no frame that sound before the first one is of.
+    bool hears = next_ > 1 || goes_on_;
     const auto copy = [&](std::size_t bytes) {
         out.bytes.insert(out.bytes.end(), sample.begin(), sample.begin() + static_cast<std::ptrdiff_t>(bytes));
         sample = sample.subspan(bytes);
@@ -70,7 +73,8 @@ Mp4Packets::Rebuilt Mp4Packets::rebuilt(std::span<const std::uint8_t> sample) {
             const auto prefix = in.u32();
             if (prefix <= sample.size() - parted_header_bytes) {
                 const auto whole = sample.first(parted_header_bytes + prefix);
-                if (!rebuild_parted(whole, prefix, out.bytes)) damaged_ += whole.size();
+                const bool sound = whole[parted_sync.size()] == static_cast<std::uint8_t>(SampleTrack::sound);
+                if ((hears || !sound) && !rebuild_parted(whole, prefix, out.bytes)) damaged_ += whole.size();
                 sample = sample.subspan(whole.size());
                 continue;
             }
@@ -80,6 +84,7 @@ Mp4Packets::Rebuilt Mp4Packets::rebuilt(std::span<const std::uint8_t> sample) {
             copy(sample.size());  // damage, which a PacketReader finds its way through
             continue;
         }
+        hears = hears || frame_type(header->kind).has_value();
         out.has_header = out.has_header || header->kind == PacketKind::sequence;
         copy(packet_overhead + payload);
     }

@@ -16,10 +16,10 @@ for kind in "" "--fragmented"; do
     cmp person.htvm back.htvm || fail "what comes back of an .mp4 ($kind) is another stream"
     cmp -s <("$htvm" info person.htvm | tail -n +2) <("$htvm" info person.mp4 | tail -n +2) || fail "info of an .mp4 ($kind)"
     expect 0 "45 frames in 1 sequence" "$htvm" verify person.mp4
-    "$htvm" decode person.mp4 --first 20 --frames 2 -o decoded.mp4.d 2>/dev/null
-    "$htvm" decode person.htvm --first 20 --frames 2 -o decoded.d 2>/dev/null
-    diff -r decoded.d decoded.mp4.d || fail "decode of an .mp4 ($kind)"
-    rm -rf decoded.d decoded.mp4.d
+    "$htvm" decode person.mp4 --first 20 --frames 2 -o of_mp4 2>/dev/null
+    "$htvm" decode person.htvm --first 20 --frames 2 -o of_htvm 2>/dev/null
+    diff -r of_htvm of_mp4 || fail "decode of an .mp4 ($kind)"
+    rm -rf of_htvm of_mp4
 done
 "$htvm" pack - -o - <person.mp4 2>/dev/null | "$htvm" info - | grep -q "45 frames" || fail "an .mp4 from standard input"
 encode vp9 -o direct.mp4 && "$htvm" pack direct.mp4 -o back.htvm 2>/dev/null
@@ -32,9 +32,9 @@ expect 0 "60 frames" "$htvm" join person.mp4 part.mp4 -o joined.mp4
 
 # ---- What is no such file -------------------------------------------------------------------------------------------
 
-head -c 3000 person.mp4 >cut.mp4
+head -c 6000 direct.mp4 >cut.mp4
 expect 3 "cut.mp4: the .mp4's" "$htvm" info cut.mp4
-printf '\0\0\0\14ftypisom\0\0\0\0\0\0\0\10moov' >empty.mp4
+printf '\0\0\0\20ftypisom\0\0\0\0\0\0\0\10moov' >empty.mp4
 expect 1 "no track of meshes" "$htvm" info empty.mp4
 
 # ---- Segments -------------------------------------------------------------------------------------------------------
@@ -49,8 +49,8 @@ segment=$(grep '^000001' www/person.m3u8)
 cat "www/$(grep -B9 "^$segment" www/person.m3u8 | grep MAP | tail -1 | cut -d'"' -f2)" "www/$segment" >one.mp4
 expect 0 "15 frames" "$htvm" verify one.mp4
 mkdir event
-expect 0 "in 4 segments" "$htvm" pack person.htvm -o event/person.m3u8 --segment 0.3 --window 1
-[ "$(grep -c '^0' event/person.m3u8)" -lt 4 ] || fail "the window keeps all: $(cat event/person.m3u8)"
+expect 0 "in 5 segments" "$htvm" pack person.htvm -o event/person.m3u8 --segment 0.3 --window 1
+[ "$(grep -c '^0' event/person.m3u8)" -lt 5 ] || fail "the window keeps all: $(cat event/person.m3u8)"
 grep -q '^#EXT-X-MEDIA-SEQUENCE:[1-9]' event/person.m3u8 || fail "the window's first segment has number 0"
 mkdir encoded
 encode vp9 -o encoded/person.m3u8 && "$htvm" pack encoded/person.m3u8 -o back.htvm 2>/dev/null
@@ -75,13 +75,19 @@ for coder in vp9 av1; do
     [ "$(ffprobe -v error -show_entries format=duration -of csv=p=0 $coder.mp4)" = "1.500000" ] || fail "duration"
     ffmpeg -v error -i $coder.mp4 -map 0:v:1 -f framemd5 - 2>errors | grep -vc '^#' | grep -qx 45 || fail "ffmpeg decodes the pictures: $(cat errors)"
     seconds=$(ffmpeg -v error -i $coder.mp4 -map 0:a -f s16le -ar 48000 - 2>errors | wc -c | awk '{ print $1 / 96000 }')
-    [ "$seconds" = 1.5 ] || fail "ffmpeg decodes $seconds s of sound: $(cat errors)"
+    # It decodes the last packet to its end.
+    python3 -c "import sys; sys.exit(not 1.5 <= $seconds < 1.52)" || fail "ffmpeg decodes $seconds s of sound: $(cat errors)"
 done
 # What ffmpeg copies of the meshes, into a QuickTime file as it knows no coder of theirs, are the same meshes.
 ffmpeg -v error -y -i vp9.mp4 -map 0:0 -c copy meshes.mov || fail "ffmpeg -c copy of meshes"
 cp meshes.mov meshes.mp4
-for stream in vp9.mp4 meshes.mp4; do "$htvm" decode $stream --first 43 -o decoded/$stream 2>/dev/null || fail "decode $stream"; done
-diff -r --exclude='*.png' decoded/vp9.mp4 decoded/meshes.mp4 >/dev/null || fail "meshes that ffmpeg copied are others"
+"$htvm" pack meshes.mp4 -o meshes.htvm 2>/dev/null
+for stream in person meshes; do
+    "$htvm" decode $stream.htvm --first 43 -o "$stream/%05d.obj" 2>/dev/null
+    cat $stream/*.obj | grep '^[vf] ' | cut -d' ' -f1-4 >$stream.vertices
+done
+[ -s meshes.vertices ] && [ "$(grep -c '^v' person.vertices)" = "$(grep -c '^v' meshes.vertices)" ] &&
+    cmp <(grep '^v' person.vertices) <(grep '^v' meshes.vertices) || fail "meshes that ffmpeg copied are others"
 ffmpeg -v error -y -i vp9.mp4 -map 0:1 -map 0:2 -c copy others.mp4 || fail "ffmpeg -c copy of pictures and sound"
 [ "$(ask v:0 codec_name,nb_frames others.mp4)" = "vp9,45" ] || fail "copied pictures: $(ask v:0 codec_name,nb_frames others.mp4)"
 expect 1 "no track of meshes" "$htvm" info others.mp4
