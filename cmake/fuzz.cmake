@@ -1,7 +1,7 @@
 # fuzz/targets/NAME.cpp: with HTVM_FUZZ, the program fuzz_NAME for libFuzzer (clang), which the tests run on the seeds and
 # on what was found; without, part of fuzz_replay, which does that with any compiler (coverage).
 file(GLOB fuzz_sources CONFIGURE_DEPENDS fuzz/targets/*.cpp)
-set(fuzz_libraries htvm_c htvm_encoder htvm_decoder htvm_io htvm_images htvm_sound htvm_live htvm_texture)
+set(fuzz_libraries htvm_c htvm_encoder htvm_decoder htvm_io htvm_images htvm_sound htvm_live htvm_texture htvm_container)
 # libdraco keeps a byte of the file in a bool and reads it back in its headers: harmless, and not our code.
 set_source_files_properties(src/io/draco_geometry.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=bool)
 if(HTVM_FUZZ)

@@ -17,6 +17,8 @@ htvm_floor(images SOURCES ${image_sources} LINKS htvm_io htvm_image_formats)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(HTVM_SOUND_FORMATS REQUIRED IMPORTED_TARGET opus sndfile samplerate)
 htvm_floor(sound DIRECTORY src/sound LINKS htvm_decoder htvm_io PkgConfig::HTVM_SOUND_FORMATS)
+# Streams in .mp4 files and in segments for HTTP.
+htvm_floor(container DIRECTORY src/container LINKS htvm_decoder)
 # Above the encoder's surface: pictures of a capture's texture in the layout of a stream's charts.
 htvm_floor(texture_baking SOURCES src/texture/texture_baking.cpp LINKS htvm_core htvm_surface)
 htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
@@ -49,7 +51,7 @@ htvm_program_library(command_line command_line htvm_core htvm_io htvm_images htv
 target_compile_definitions(htvm_command_line PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
 include(cmake/embed.cmake)
 include(cmake/live.cmake)
-htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_sound htvm_texture htvm_texture_baking htvm_synth htvm_metrics htvm_live)
+htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_sound htvm_texture htvm_texture_baking htvm_synth htvm_metrics htvm_live htvm_container)
 # The stream of `htvm demo`: apps/htvm/demo/make.sh made it.
 set(demo_stream ${PROJECT_SOURCE_DIR}/apps/htvm/demo/person.htvm)
 set(demo_cpp ${PROJECT_BINARY_DIR}/demo/demo_stream.cpp)

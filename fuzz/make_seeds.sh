@@ -77,6 +77,14 @@ stream tiny_tracked tiny --unit mm -q 30 --profile tracked -s "$tiny"
 stream tiny_tracked_intra tiny --unit mm -q 30 --profile tracked --tracked-from intra
 stream tiny_grouped tiny --unit mm -q 30 --profile tracked --group 3
 stream tiny_presence tiny --unit mm -q 30 --profile tracked --group 2 --presence on
+mkdir -p "$out"/import_{mp4,playlist}
+for kind in "" --fragmented; do
+    "$htvm" pack "$work/tiny_tracked.htvm" -o "$work/tiny.mp4" $kind >/dev/null 2>&1
+    { printf '\x01' && cat "$work/tiny.mp4"; } >"$out/import_mp4/tiny$kind"
+done
+head -c 300 "$work/tiny_tracked.htvm" >"$out/import_mp4/packets"
+"$htvm" pack "$work/tiny_tracked.htvm" -o "$work/tiny.m3u8" --window 1 >/dev/null 2>&1
+cp "$work/tiny.m3u8" "$out/import_playlist/window"
 stream tiny_paper tiny --unit mm -q 10 --profile paper -s "$tiny"
 
 head -c 100 "$work/normals/frame_00060.ply" >"$out/import_ply/cut_off"

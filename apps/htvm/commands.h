@@ -16,6 +16,7 @@ void add_index(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);
 void add_join(CLI::App& app, Run& run);
 void add_link(CLI::App& app, Run& run);
+void add_pack(CLI::App& app, Run& run);
 void add_play(CLI::App& app, Run& run);
 void add_publish(CLI::App& app, Run& run);
 void add_render(CLI::App& app, Run& run);

@@ -24,6 +24,7 @@
 #include "live/server/server.h"
 #include "picture_options.h"
 #include "sequences.h"
+#include "stream_file.h"
 
 namespace htvm::app {
 namespace {
@@ -76,13 +77,35 @@ Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeRe
     return stream;
 }
 
+// The player reads .htvm: a stream in another kind of file is unpacked, which encodes nothing.
+Result<fs::path> unpack(const std::string& packed, TemporaryFolder& folder) {
+    if (!folder.make()) return fail(ErrorKind::bad_input, "there is no place for a temporary file (TMPDIR)");
+    const auto stream = folder.path / fs::path(packed).filename().replace_extension(".htvm");
+    auto input = StreamInput::open(packed, DecoderOptions().max_packet_bytes);
+    if (!input) return tl::unexpected(input.error());
+    auto output = StreamOutput::open(stream.string());
+    if (!output) return tl::unexpected(output.error());
+    while (const auto packet = input->next()) {
+        output->add_bounds_of(*packet);
+        if (packet->kind == PacketKind::front_index) continue;
+        if (auto written = output->write(*packet); !written) return tl::unexpected(written.error());
+    }
+    if (auto fine = check_whole(*input, packed); !fine) return tl::unexpected(fine.error());
+    if (auto finished = output->finish(); !finished) return tl::unexpected(finished.error());
+    return stream;
+}
+
 // A stream that can be served; a capture is encoded first. The server follows no symbolic link, but this may be one.
 Result<fs::path> stream_of(const std::vector<std::string>& inputs, const EncodeRequest& encoding,
                            TemporaryFolder& folder) {
     fs::path stream = inputs[0];
-    if (inputs.size() > 1 && stream.extension() == ".htvm")
+    if (inputs.size() > 1 && is_stream_name(inputs[0]))
         return fail(ErrorKind::bad_input, "only one stream is shown at a time; name the folder that they are in");
-    if (stream.extension() != ".htvm") {
+    if (is_stream_name(inputs[0]) && stream.extension() != ".htvm") {
+        auto unpacked = unpack(inputs[0], folder);
+        if (!unpacked) return unpacked;
+        stream = *unpacked;
+    } else if (stream.extension() != ".htvm") {
         auto encoded = encode_capture(inputs, encoding, folder);
         if (!encoded) return encoded;
         stream = *encoded;
@@ -224,9 +247,10 @@ void add_play(CLI::App& app, Run& run) {
     auto options = std::make_shared<PlayOptions>();
     auto* command = app.add_subcommand("play", "Look at a stream or a capture in a web browser");
     command
-        ->add_option("input", options->inputs,
-                     "A stream (.htvm), a folder of streams, or a capture as htvm encode takes it (a folder, a "
-                     "pattern, meshes), which is encoded first")
+        ->add_option(
+            "input", options->inputs,
+            "A stream (.htvm, .mp4 or .m3u8), a folder of streams, or a capture as htvm encode takes it (a folder, a "
+            "pattern, meshes), which is encoded first")
         ->expected(1, -1)
         ->required();
     auto* beside =

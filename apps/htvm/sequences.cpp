@@ -164,7 +164,7 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
     const auto& name = names.front();
     if (name == "-")
         return fail(ErrorKind::bad_input, "standard input is not read here; give files, a folder or an .htvm stream");
-    if (names.size() == 1 && name.ends_with(".htvm")) {
+    if (names.size() == 1 && is_stream_name(name)) {
         if (!options.texture.files.empty() || options.texture.origin != TextureOrigin::by_format)
             return fail(
                 ErrorKind::bad_input,

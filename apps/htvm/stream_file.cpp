@@ -18,10 +18,12 @@
 #include "command_line/headings.h"
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
+#include "container/mp4_packets.h"
 #include "core/letter_case.h"
 #include "htvm/decoder.hpp"
 #include "io/mesh_file.h"
 #include "live/client/hub_address.h"
+#include "segment_folder.h"
 
 namespace htvm::app {
 
@@ -49,11 +51,35 @@ Result<live::Watcher> open_watcher(const std::string& address, std::size_t max_p
 
 }  // namespace
 
+bool is_stream_name(const std::string& path) {
+    const auto ending = internal::lower_case(std::filesystem::path(path).extension().string());
+    return ending == ".htvm" || ending == ".mp4" || is_playlist_name(path);
+}
+
+namespace {
+
+Result<FileBytes> source_of_file(std::shared_ptr<std::ifstream> file, const std::string& path) {
+    file->clear();
+    file->seekg(0, std::ios::end);
+    const auto size = file->tellg();
+    if (size < 0)
+        return fail(ErrorKind::bad_input, path + " is an .mp4, which is read from a file alone, not from a pipe");
+    return FileBytes{
+        static_cast<std::uint64_t>(size), [file = std::move(file)](std::uint64_t offset, std::span<std::uint8_t> to) {
+            file->clear();
+            file->seekg(static_cast<std::streamoff>(offset));
+            return bool(file->read(reinterpret_cast<char*>(to.data()), static_cast<std::streamsize>(to.size())));
+        }};
+}
+
+}  // namespace
+
 Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max_packet_bytes, const HubTrust& trust) {
     StreamInput input;
     const auto most =
         static_cast<std::size_t>(std::min<std::uint64_t>(max_packet_bytes, std::numeric_limits<std::size_t>::max()));
     input.reader_ = PacketReader(most);
+    input.max_packet_bytes_ = max_packet_bytes;
     if (live::looks_like_hub_address(path)) {
         if (path.find("/watch/") == std::string::npos)
             return fail(ErrorKind::bad_input, "'" + path.substr(0, path.find('?')) +
@@ -66,17 +92,85 @@ Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max
     }
     input.standard_ = path == "-";
     if (input.standard_) return input;
+    const auto open_mp4 = [&](Result<FileBytes> source) -> Result<void> {
+        if (!source) return tl::unexpected(source.error());
+        auto opened = Mp4Packets::open(std::move(*source), max_packet_bytes);
+        if (!opened) return fail(opened.error().kind, path + ": " + opened.error().message);
+        input.mp4_ = std::make_shared<Mp4Packets>(std::move(*opened));
+        return {};
+    };
+    if (is_playlist_name(path)) {
+        if (auto opened = open_mp4(source_of_playlist(path)); !opened) return tl::unexpected(opened.error());
+        return input;
+    }
     if (std::filesystem::is_directory(path))
         return fail(ErrorKind::bad_input, path + " is a folder; give an .htvm file");
-    input.file_.open(path, std::ios::binary);
-    if (!input.file_) return fail(ErrorKind::bad_input, path + " cannot be read: " + std::strerror(errno));
+    input.file_->open(path, std::ios::binary);
+    if (!*input.file_) return fail(ErrorKind::bad_input, path + " cannot be read: " + std::strerror(errno));
+    if (!std::filesystem::is_regular_file(path)) return input;  // what is read of a pipe is gone
+    std::array<std::uint8_t, 8> beginning{};
+    input.file_->read(reinterpret_cast<char*>(beginning.data()), beginning.size());
+    const bool mp4 = input.file_->gcount() == beginning.size() && looks_like_mp4(beginning);
+    input.file_->clear();
+    input.file_->seekg(0);
+    if (!mp4) return input;
+    if (auto opened = open_mp4(source_of_file(input.file_, path)); !opened) return tl::unexpected(opened.error());
     return input;
+}
+
+std::uint64_t StreamInput::damaged_bytes() const {
+    return reader_.damaged_bytes() + (watcher_ ? watcher_->state().damaged_bytes : 0) +
+           (mp4_ ? mp4_->damaged_bytes() : 0);
 }
 
 void StreamInput::go_on_with(std::vector<Packet> first, std::uint64_t offset) {
     first_.assign(std::make_move_iterator(first.begin()), std::make_move_iterator(first.end()));
-    file_.clear();
-    file_.seekg(static_cast<std::streamoff>(offset));
+    file_->clear();
+    file_->seekg(static_cast<std::streamoff>(offset));
+}
+
+// Whether standard input is an .mp4, which is then read to its end, as its tables may lie there.
+bool StreamInput::begin_standard() {
+    std::array<std::uint8_t, 8> beginning{};
+    std::cin.read(reinterpret_cast<char*>(beginning.data()), beginning.size());
+    const auto got = static_cast<std::size_t>(std::cin.gcount());
+    const auto known = std::span(beginning).first(got);
+    if (!looks_like_mp4(known)) {
+        reader_.push(known);
+        return false;
+    }
+    auto all = std::make_shared<std::vector<std::uint8_t>>(known.begin(), known.end());
+    std::array<char, 65536> buffer;
+    while (std::cin.read(buffer.data(), buffer.size()), std::cin.gcount() > 0)
+        all->insert(all->end(), buffer.begin(), buffer.begin() + std::cin.gcount());
+    auto source = source_of(*all);
+    source.read = [all, read = std::move(source.read)](std::uint64_t offset, std::span<std::uint8_t> to) {
+        return read(offset, to);
+    };
+    auto opened = Mp4Packets::open(std::move(source), max_packet_bytes_);
+    if (opened)
+        mp4_ = std::make_shared<Mp4Packets>(std::move(*opened));
+    else
+        refusal_ = Error{opened.error().kind, "standard input: " + opened.error().message};
+    return true;
+}
+
+// Pushes more bytes to the reader; false at the end.
+bool StreamInput::read_some() {
+    if (standard_ && !std::exchange(begun_, true) && begin_standard() && refusal_) return false;
+    if (mp4_) {
+        const auto bytes = mp4_->next();
+        if (bytes) reader_.push(*bytes);
+        return bytes.has_value();
+    }
+    std::istream& in = standard_ ? std::cin : *file_;
+    std::array<char, 65536> buffer;
+    // Data of a live stream is taken as it arrives, not only once the buffer is full.
+    in.read(buffer.data(), 1);
+    std::streamsize got = in.gcount();
+    if (got > 0) got += in.readsome(buffer.data() + 1, static_cast<std::streamsize>(buffer.size()) - 1);
+    reader_.push({reinterpret_cast<const std::uint8_t*>(buffer.data()), static_cast<std::size_t>(got)});
+    return got > 0;
 }
 
 std::optional<Packet> StreamInput::next() {
@@ -91,20 +185,10 @@ std::optional<Packet> StreamInput::next() {
         refusal_ = packet.error();
         return std::nullopt;
     }
-    std::istream& in = standard_ ? std::cin : file_;
-    std::array<char, 65536> buffer;
     for (;;) {
         if (auto packet = reader_.pull()) return packet;
         if (at_end_) return std::nullopt;
-        // Data of a live stream is taken as it arrives, not only once the buffer is full.
-        in.read(buffer.data(), 1);
-        std::streamsize got = in.gcount();
-        if (got > 0) got += in.readsome(buffer.data() + 1, static_cast<std::streamsize>(buffer.size()) - 1);
-        if (got == 0) {
-            at_end_ = true;
-            continue;
-        }
-        reader_.push({reinterpret_cast<const std::uint8_t*>(buffer.data()), static_cast<std::size_t>(got)});
+        at_end_ = !read_some();
     }
 }
 
@@ -131,12 +215,28 @@ std::string other_kind_of(const std::filesystem::path& path) {
     const auto is_of = [&](std::initializer_list<const char*> endings) {
         return std::find(endings.begin(), endings.end(), ending) != endings.end();
     };
-    if (is_of({".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".y4m", ".mpg"})) return "a video";
+    if (is_of({".m4v", ".mov", ".mkv", ".webm", ".avi", ".y4m", ".mpg"})) return "a video";
     if (is_of({".png", ".jpg", ".jpeg", ".webp", ".gif"})) return "a picture";
     if (is_of({".wav", ".flac", ".opus", ".ogg", ".mp3", ".m4a", ".aac"})) return "a sound";
     if (is_of({".bvh", ".json", ".csv", ".txt", ".html"})) return "a text";
     if (is_of({".zip", ".gz", ".tar", ".7z", ".usd", ".usdz", ".fbx", ".abc"})) return "another format";
     return {};
+}
+
+// The packets of a file that this program has written.
+Result<PacketSource> packets_in(const std::filesystem::path& path) {
+    auto file = std::make_shared<std::ifstream>(path, std::ios::binary);
+    if (!*file) return fail(ErrorKind::bad_input, path.string() + " cannot be read again");
+    return PacketSource([file, reader = std::make_shared<PacketReader>(),
+                         buffer = std::vector<char>(std::size_t{1} << 20)]() mutable -> std::optional<Packet> {
+        for (;;) {
+            if (auto packet = reader->pull()) return packet;
+            file->read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+            const auto got = static_cast<std::size_t>(file->gcount());
+            if (got == 0) return std::nullopt;
+            reader->push({reinterpret_cast<const std::uint8_t*>(buffer.data()), got});
+        }
+    });
 }
 
 }  // namespace
@@ -153,7 +253,20 @@ Result<StreamOutput> StreamOutput::open(const std::string& path, const Publishin
     if (const auto what = other_kind_of(path); !what.empty())
         return fail(ErrorKind::bad_input, path + " is the name of " + what +
                                               ", but a stream would be written there; give one that ends in .htvm");
-    auto file = OutputFile::create(path);
+    // Of which another file is made at the end.
+    std::string packets = path;
+    constexpr const char* packets_beside = ".htvm";
+    if (internal::lower_case(std::filesystem::path(path).extension().string()) == ".mp4") {
+        auto mp4 = OutputFile::create(path);
+        if (!mp4) return tl::unexpected(mp4.error());
+        output.mp4_.emplace(std::move(*mp4));
+        packets += packets_beside;
+    }
+    if (is_playlist_name(path)) {
+        output.playlist_ = path;
+        packets += packets_beside;
+    }
+    auto file = OutputFile::create(packets);
     if (!file) return tl::unexpected(file.error());
     output.file_.emplace(std::move(*file));
     return output;
@@ -211,6 +324,8 @@ Result<void> StreamOutput::finish() {
     if (!file_) return {};
     if (!is_indexed()) return file_->finish();
     const auto index = indexer_.finish(bytes_);
+    if (mp4_) return finish_mp4(index);
+    if (!playlist_.empty()) return finish_segments(index);
     if (index.frames == 0) return file_->finish();
     const auto front = write_packet(write_index(index));
     if (const auto done = file_->finish_behind(front); !done) {
@@ -220,6 +335,36 @@ Result<void> StreamOutput::finish() {
         return file_->finish();
     }
     bytes_ += front.size();
+    has_index_ = true;
+    return {};
+}
+
+// Makes the .mp4 of the packets, which are in a file that goes away with this one.
+Result<void> StreamOutput::finish_mp4(const StreamIndex& index) {
+    if (auto flushed = file_->flush(); !flushed) return flushed;
+    const auto open = [&packets = file_->written_at()] { return packets_in(packets); };
+    std::uint64_t bytes = 0;
+    const auto written = write_mp4(open, write_index(index), mp4_options_, [&](std::span<const std::uint8_t> piece) {
+        bytes += piece.size();
+        return mp4_->write(piece);
+    });
+    if (!written) return written;
+    bytes_ = bytes;
+    has_index_ = true;
+    return mp4_->finish();
+}
+
+// Makes the segments, likewise.
+Result<void> StreamOutput::finish_segments(const StreamIndex& index) {
+    if (auto flushed = file_->flush(); !flushed) return flushed;
+    auto source = packets_in(file_->written_at());
+    if (!source) return tl::unexpected(source.error());
+    SegmentFolder folder(playlist_, {});
+    if (auto written = folder.write(write_index(index)); !written) return written;
+    while (auto packet = (*source)())
+        if (auto written = folder.write(std::move(*packet)); !written) return written;
+    if (auto finished = folder.finish(); !finished) return finished;
+    bytes_ = folder.bytes();
     has_index_ = true;
     return {};
 }

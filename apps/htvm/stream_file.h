@@ -1,15 +1,18 @@
-// Streams as the commands read and write them: packets in a file, on standard input and output, or from and to a hub.
+// Streams as the commands read and write them: packets in a file, on standard input and output, or from and to a hub;
+// an .mp4 is turned into packets and back here, so that no command knows of it.
 // Also the options that limit what the commands accept as a stream.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "audio_track.h"
+#include "container/mp4_file.h"
 #include "htvm/decoder.hpp"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
@@ -23,7 +26,14 @@ namespace CLI {
 class App;
 }
 
+namespace htvm {
+class Mp4Packets;
+}
+
 namespace htvm::app {
+
+// Whether a file of that name is a stream, not a capture: .htvm, .mp4, or a playlist, .m3u8.
+bool is_stream_name(const std::string& path);
 
 class StreamInput {
 public:
@@ -36,9 +46,7 @@ public:
     // Why a hub does not show a live stream.
     const std::optional<Error>& refusal() const { return refusal_; }
     bool is_live() const { return watcher_.has_value(); }
-    std::uint64_t damaged_bytes() const {
-        return reader_.damaged_bytes() + (watcher_ ? watcher_->state().damaged_bytes : 0);
-    }
+    std::uint64_t damaged_bytes() const;
     std::uint64_t oversized_packets() const { return reader_.oversized_packets(); }
     // At the end: bytes of a truncated packet.
     std::size_t cut_short_bytes() const { return at_end_ ? reader_.pending_bytes() : 0; }
@@ -46,10 +54,14 @@ public:
     void go_on_with(std::vector<Packet> first, std::uint64_t offset);
 
 private:
-    std::ifstream file_;
+    bool read_some();
+    bool begin_standard();
+    std::shared_ptr<std::ifstream> file_ = std::make_shared<std::ifstream>();
     std::optional<live::Watcher> watcher_;
+    std::uint64_t max_packet_bytes_ = 0;
     std::optional<Error> refusal_;
-    bool standard_ = false, at_end_ = false;
+    std::shared_ptr<Mp4Packets> mp4_;
+    bool standard_ = false, at_end_ = false, begun_ = false;
     PacketReader reader_;
     std::deque<Packet> first_;
 };
@@ -59,7 +71,8 @@ Result<void> check_whole(const StreamInput& input, const std::string& path,
                          const std::string& advice = "'htvm verify' tells more");
 
 // A file is there once it is finished: until then its packets are in a file beside it, and what was there before stays.
-// It then begins with an index; those at the end of streams are left out of it. To a hub, packets go at once.
+// It then begins with an index; those at the end of streams are left out of it. An .mp4, or segments and their
+// playlist, are made of these packets at the end. To a hub, packets go at once.
 class StreamOutput {
 public:
     // "-" is standard output, ws:// and wss:// a hub.
@@ -70,6 +83,8 @@ public:
     double held_back() const { return held_back_; }
     // The hub, if there is one.
     Publishing* publishing() { return publishing_ ? &*publishing_ : nullptr; }
+    // How an .mp4 is written, if it is one.
+    void set(const Mp4Options& options) { mp4_options_ = options; }
     // Lays sound between the frames of the stream, in the place of its own. Before anything is written.
     void lay(AudioTrack audio) { audio_.emplace(std::move(audio)); }
     Result<void> write(const Packet& packet);
@@ -95,6 +110,11 @@ private:
     bool is_indexed() const { return file_ && file_->is_file(); }
     Result<void> write_all(const std::vector<Packet>& packets);
     Result<void> write_one(const Packet& packet);
+    Result<void> finish_mp4(const StreamIndex& index);
+    Result<void> finish_segments(const StreamIndex& index);
+    std::string playlist_;           // of the segments that file_ becomes; empty: it becomes none
+    std::optional<OutputFile> mp4_;  // where file_ becomes one
+    Mp4Options mp4_options_;
     std::optional<OutputFile> file_;  // none: standard output, or a hub
     std::optional<Publishing> publishing_;
     std::optional<Pacing> pacing_;

@@ -35,6 +35,8 @@ public:
     Result<void> finish_behind(std::span<const std::uint8_t> front);
     // Whether it is a file, not a pipe or a device.
     bool is_file() const { return !partial_.empty(); }
+    // Where what was written so far can be read, once it is flushed.
+    const std::filesystem::path& written_at() const { return partial_.empty() ? path_ : partial_; }
     // Leaves what was written so far beside its place and gives its name; an empty one where all went to a pipe or a
     // device.
     std::filesystem::path keep();

@@ -81,7 +81,7 @@ expect 0 "M2" "$htvm" compare survey survey.htvm --unit m --only m2
 expect 0 "M2" "$htvm" compare survey surveyed --unit m --only m2
 
 # A stream under another format's name.
-for name in x.glb x.mp4 x.wav x.PNG x.zip; do
+for name in x.glb x.mkv x.wav x.PNG x.zip; do
     expect 1 "give one that ends in .htvm" "$htvm" encode capture -o $name
     [ ! -e $name ] || fail "$name is written"
 done

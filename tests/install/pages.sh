@@ -13,7 +13,7 @@ fail() { echo "FAILED: $*"; exit 1; }
 
 # ---- man pages --------------------------------------------------------------------------------------------------------
 
-[ "$(cd man1 && echo *)" = "htvm-calibrate.1 htvm-check.1 htvm-compare.1 htvm-cut.1 htvm-decode.1 htvm-demo.1 htvm-encode.1 htvm-help.1 htvm-index.1 htvm-info.1 htvm-join.1 htvm-lab-bake.1 htvm-lab-decoding.1 htvm-lab-endure.1 htvm-lab-events.1 htvm-lab-help.1 htvm-lab-hierarchy.1 htvm-lab-rd.1 htvm-lab-reproduce.1 htvm-lab.1 htvm-link.1 htvm-play.1 htvm-publish.1 htvm-render.1 htvm-serve.1 htvm-still.1 htvm-synth.1 htvm-verify.1 htvm.1" ] ||
+[ "$(cd man1 && echo *)" = "htvm-calibrate.1 htvm-check.1 htvm-compare.1 htvm-cut.1 htvm-decode.1 htvm-demo.1 htvm-encode.1 htvm-help.1 htvm-index.1 htvm-info.1 htvm-join.1 htvm-lab-bake.1 htvm-lab-decoding.1 htvm-lab-endure.1 htvm-lab-events.1 htvm-lab-help.1 htvm-lab-hierarchy.1 htvm-lab-rd.1 htvm-lab-reproduce.1 htvm-lab.1 htvm-link.1 htvm-pack.1 htvm-play.1 htvm-publish.1 htvm-render.1 htvm-serve.1 htvm-still.1 htvm-synth.1 htvm-verify.1 htvm.1" ] ||
     fail "the pages are $(cd man1 && echo *)"
 for page in man1/*.1; do
     for section in NAME SYNOPSIS DESCRIPTION OPTIONS '"EXIT STATUS"' '"SEE ALSO"'; do
@@ -40,7 +40,7 @@ has_options() {
         checks=$((checks + 1))
     done
 }
-for command in synth encode decode info calibrate compare cut join index verify still render play publish serve link; do has_options "$htvm" $command htvm; done
+for command in synth encode decode info calibrate compare cut join pack index verify still render play publish serve link; do has_options "$htvm" $command htvm; done
 for command in rd decoding reproduce events endure bake; do has_options "$lab" $command htvm-lab; done
 [ $checks -gt 100 ] || fail "only $checks checks: the help was not read"
 grep -q '^\.SH EXAMPLES' man1/htvm-encode.1 || fail "no examples"

@@ -1,0 +1,173 @@
+#include "container/playlist.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+namespace htvm {
+namespace {
+
+constexpr std::size_t most_segments = 1000000, most_uri = 2048;
+constexpr double longest = 86400;  // seconds of a segment
+
+std::string hexadecimal(std::uint64_t value, int digits) {
+    std::string out;
+    for (int i = digits - 1; i >= 0; --i) out += "0123456789abcdef"[(value >> (4 * i)) & 15];
+    return out;
+}
+
+// Digits, and digits behind a point where `fraction` allows them, up to anything else. Nothing if there is none.
+std::optional<double> number_at(std::string_view text, bool fraction) {
+    double out = 0, place = 1;
+    bool any = false, behind = false;
+    for (const char c : text) {
+        if (c == '.' && fraction && !behind) {
+            behind = true;
+            continue;
+        }
+        if (c < '0' || c > '9') break;
+        any = true;
+        if (behind) place /= 10;
+        out = behind ? out + place * (c - '0') : 10 * out + (c - '0');
+    }
+    return any ? std::optional(out) : std::nullopt;
+}
+
+bool takes(std::string_view& line, std::string_view beginning) {
+    if (!line.starts_with(beginning)) return false;
+    line.remove_prefix(beginning.size());
+    return true;
+}
+
+// The value of an attribute in quotes.
+std::optional<std::string> quoted(std::string_view attributes, std::string_view name) {
+    const auto at = attributes.find(std::string(name) + "=\"");
+    if (at == std::string_view::npos) return std::nullopt;
+    const auto begin = at + name.size() + 2, end = attributes.find('"', begin);
+    if (end == std::string_view::npos) return std::nullopt;
+    return std::string(attributes.substr(begin, end - begin));
+}
+
+struct Reading {
+    Playlist out;
+    std::optional<double> seconds;  // of the segment whose name comes next
+    std::string map;
+};
+
+tl::unexpected<Error> corrupt(const std::string& what) {
+    return fail(ErrorKind::corrupt_stream, "the playlist " + what);
+}
+
+Result<void> take_tag(Reading& reading, std::string_view line) {
+    auto& out = reading.out;
+    const auto number = [&](double most, bool fraction) -> Result<double> {
+        const auto value = number_at(line, fraction);
+        if (!value || *value > most) return corrupt("has a number that is none: " + std::string(line.substr(0, 40)));
+        return *value;
+    };
+    if (takes(line, "#EXTINF:")) {
+        const auto value = number(longest, true);
+        if (!value) return tl::unexpected(value.error());
+        reading.seconds = *value;
+    } else if (takes(line, "#EXT-X-TARGETDURATION:")) {
+        const auto value = number(longest, true);
+        if (!value) return tl::unexpected(value.error());
+        out.target_seconds = *value;
+    } else if (takes(line, "#EXT-X-MEDIA-SEQUENCE:")) {
+        const auto value = number(9007199254740991.0, false);
+        if (!value) return tl::unexpected(value.error());
+        out.first_number = static_cast<std::uint64_t>(*value);
+    } else if (takes(line, "#EXT-X-PLAYLIST-TYPE:")) {
+        out.kind = line == "VOD" ? PlaylistKind::whole : PlaylistKind::event;
+    } else if (takes(line, "#EXT-X-MAP:")) {
+        const auto uri = quoted(line, "URI");
+        if (!uri || uri->empty() || uri->size() > most_uri) return corrupt("has a map without a name");
+        reading.map = *uri;
+        if (line.find("BYTERANGE") != std::string_view::npos)
+            return fail(ErrorKind::unsupported, "the playlist has maps that are parts of files");
+    } else if (line == "#EXT-X-ENDLIST") {
+        out.has_end = true;
+    } else if (line.starts_with("#EXT-X-STREAM-INF") || line.starts_with("#EXT-X-BYTERANGE") ||
+               (line.starts_with("#EXT-X-KEY") && line.find("METHOD=NONE") == std::string_view::npos)) {
+        return fail(ErrorKind::unsupported,
+                    "the playlist has " + std::string(line.substr(0, line.find(':'))) + ", which is not read here");
+    }
+    return {};
+}
+
+}  // namespace
+
+std::string write_playlist(const Playlist& playlist) {
+    double longest_segment = std::max(playlist.target_seconds, 1.0);
+    for (const auto& segment : playlist.segments) longest_segment = std::max(longest_segment, segment.seconds);
+    std::string out = "#EXTM3U\n#EXT-X-VERSION:7\n";
+    out += "#EXT-X-TARGETDURATION:" + std::to_string(static_cast<long>(std::ceil(longest_segment - 0.0005))) + "\n";
+    out += "#EXT-X-MEDIA-SEQUENCE:" + std::to_string(playlist.first_number) + "\n";
+    if (playlist.kind == PlaylistKind::whole) out += "#EXT-X-PLAYLIST-TYPE:VOD\n";
+    if (playlist.kind == PlaylistKind::event) out += "#EXT-X-PLAYLIST-TYPE:EVENT\n";
+    out += "#EXT-X-INDEPENDENT-SEGMENTS\n";
+    std::string map;
+    for (const auto& segment : playlist.segments) {
+        if (segment.map_uri != map) out += "#EXT-X-MAP:URI=\"" + segment.map_uri + "\"\n";
+        map = segment.map_uri;
+        std::array<char, 64> seconds{};
+        std::snprintf(seconds.data(), seconds.size(), "%lld.%06lld",
+                      static_cast<long long>(std::llround(segment.seconds * 1e6)) / 1000000,
+                      static_cast<long long>(std::llround(segment.seconds * 1e6)) % 1000000);
+        out += "#EXTINF:" + std::string(seconds.data()) + ",\n" + segment.uri + "\n";
+    }
+    if (playlist.has_end) out += "#EXT-X-ENDLIST\n";
+    return out;
+}
+
+Result<Playlist> read_playlist(std::string_view text) {
+    if (!text.starts_with("#EXTM3U")) return corrupt("does not begin with #EXTM3U");
+    Reading reading;
+    reading.out.kind = PlaylistKind::window;
+    reading.out.has_end = false;
+    while (!text.empty()) {
+        auto line = text.substr(0, text.find('\n'));
+        text.remove_prefix(std::min(text.size(), line.size() + 1));
+        while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
+        if (line.empty()) continue;
+        if (line[0] == '#') {
+            if (auto ok = take_tag(reading, line); !ok) return tl::unexpected(ok.error());
+            continue;
+        }
+        if (line.size() > most_uri) return corrupt("has a name that is too long");
+        if (!reading.seconds) return corrupt("has a segment without #EXTINF: " + std::string(line.substr(0, 80)));
+        if (reading.map.empty()) return corrupt("has a segment without #EXT-X-MAP: " + std::string(line.substr(0, 80)));
+        if (reading.out.segments.size() >= most_segments)
+            return fail(ErrorKind::limit, "the playlist has more segments than are taken");
+        reading.out.segments.push_back({std::string(line), reading.map, *reading.seconds});
+        reading.seconds.reset();
+    }
+    return std::move(reading.out);
+}
+
+bool is_name_below(std::string_view uri) {
+    if (uri.empty() || uri[0] == '/' || uri.size() > most_uri) return false;
+    if (uri.find_first_of(":\\?#%") != std::string_view::npos || uri.find('\0') != std::string_view::npos) return false;
+    for (std::size_t begin = 0; begin <= uri.size();) {
+        const auto end = std::min(uri.find('/', begin), uri.size());
+        const auto part = uri.substr(begin, end - begin);
+        if (part.empty() || part == "." || part == "..") return false;
+        begin = end + 1;
+    }
+    return true;
+}
+
+std::string name_by_content(std::span<const std::uint8_t> bytes) {
+    // FNV-1a, and a second hash of another kind. A CRC-32 would be the same for all that ends with its own, as maps do.
+    std::uint64_t hash = 0xcbf29ce484222325, other = bytes.size();
+    for (const auto byte : bytes) {
+        hash = (hash ^ byte) * 0x100000001b3;
+        other = (other + byte + 1) * 0x9e3779b97f4a7c15;
+        other ^= other >> 29;
+    }
+    return hexadecimal(hash, 16) + hexadecimal(other >> 32, 8);
+}
+
+}  // namespace htvm

@@ -1,0 +1,46 @@
+// Playlists of HLS (RFC 8216) for a stream's segments (fragment.h): what players and caches read.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "htvm/result.hpp"
+
+namespace htvm {
+
+struct PlaylistSegment {
+    std::string uri;      // relative to the playlist
+    std::string map_uri;  // of what is needed before its first frame
+    double seconds = 0;
+};
+
+enum class PlaylistKind : std::uint8_t {
+    whole,   // of a stream that is over: it does not change
+    event,   // of a live stream, from its beginning: segments are added
+    window,  // of a live stream: segments are added, and the oldest taken away
+};
+
+struct Playlist {
+    PlaylistKind kind = PlaylistKind::whole;
+    std::uint64_t first_number = 0;  // of the first segment that is listed
+    double target_seconds = 1;       // that no segment is longer than, when rounded
+    std::vector<PlaylistSegment> segments;
+    bool has_end = true;  // no segment follows
+};
+
+std::string write_playlist(const Playlist& playlist);
+// corrupt_stream if it is no playlist of segments with maps, or a number in it is none. unsupported: a tag asks for
+// what is not done here: encryption, parts of files, or a list of playlists.
+Result<Playlist> read_playlist(std::string_view text);
+
+// Whether an URI of a playlist names a file beside it, or in a folder below: nothing else of a file system is to be
+// read because a playlist says so.
+bool is_name_below(std::string_view uri);
+
+// A name for these bytes alone, of 24 letters: other bytes have another, but for one chance in 2^64.
+std::string name_by_content(std::span<const std::uint8_t> bytes);
+
+}  // namespace htvm
