@@ -238,7 +238,7 @@ struct.pack_into("<I", data, last + 8, 2**32 - 1)
 struct.pack_into("<I", data, last + 28, zlib.crc32(data[last + 4:last + 28]))
 open(out, "wb").write(data)
 PYTHON
-expect 5 "frames of one sequence have numbers below 2^32" "$htvm" join far.htvm part0.htvm -o numbered.htvm
+expect 5 "frames of one sequence have numbers below 2^32" "$htvm" join far.htvm live.htvm -o numbered.htvm
 for command in cut join index; do
     cp walk.htvm kept.htvm
     case $command in
