@@ -44,7 +44,9 @@ public:
     std::size_t cut_short_bytes() const { return at_end_ ? reader_.pending_bytes() : 0; }
     // Bytes behind the last whole packet, at the end: what a program left that was killed while it wrote, or a machine
     // that lost its power.
-    std::uint64_t torn_bytes() const { return at_end_ ? damaged_bytes() - damaged_before_ + reader_.pending_bytes() : 0; }
+    std::uint64_t torn_bytes() const {
+        return at_end_ ? damaged_bytes() - damaged_before_ + reader_.pending_bytes() : 0;
+    }
     // From now on these packets come first, then those of the file from this place on.
     void go_on_with(std::vector<Packet> first, std::uint64_t offset);
 

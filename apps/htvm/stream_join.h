@@ -35,12 +35,12 @@ private:
     struct Stream {
         FrameNumbers numbers;
         RunningTime time;
-        std::optional<Packet> in_force;       // its sequence header
-        std::optional<Packet> header;         // waits for the frame behind it
-        std::vector<Packet> waiting;          // likewise, codebooks and others
-        std::uint32_t first = 0;              // own number of its sequence's first frame,
-        std::uint64_t number = 0;             // and that in the output
-        std::int64_t later_us = 0;            // added to timestamps
+        std::optional<Packet> in_force;  // its sequence header
+        std::optional<Packet> header;    // waits for the frame behind it
+        std::vector<Packet> waiting;     // likewise, codebooks and others
+        std::uint32_t first = 0;         // own number of its sequence's first frame,
+        std::uint64_t number = 0;        // and that in the output
+        std::int64_t later_us = 0;       // added to timestamps
         bool begun = false;
         std::optional<double> pause_seconds;
     };

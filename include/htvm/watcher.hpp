@@ -8,9 +8,9 @@
 //       if (auto frame = decoder.decode(**packet); frame && *frame) show((*frame)->mesh);
 //   }
 //
-// A lost line or a restarted hub ends nothing: the watcher connects again, to the next of the hubs that it knows, and goes
-// on; what it has had is left out. What the owner does not take in time the hub drops, by the rule of dependency.hpp, so
-// that what does come can be decoded.
+// A lost line or a restarted hub ends nothing: the watcher connects again, to the next of the hubs that it knows, and
+// goes on; what it has had is left out. What the owner does not take in time the hub drops, by the rule of
+// dependency.hpp, so that what does come can be decoded.
 //
 // Threads. It has one of its own, which reads from the line; of the caller's threads one at a time may use it, but for
 // stop() and state(), which any may call at any time. What next() gives is the caller's.

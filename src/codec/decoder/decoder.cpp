@@ -272,8 +272,8 @@ std::uint64_t work_of(const DecoderState& state, const Packet& packet, const Fra
     const auto& detail = state.reference->detail;
     const auto held = counts(state.reference->mesh());
     const auto levels = std::min<std::size_t>(state.options.detail_levels, detail.levels.size());
-    const auto shown = levels == 0 ? held
-                                   : MeshCounts{held.vertices + detail.vertices(), detail.triangles(levels).size()};
+    const auto shown =
+        levels == 0 ? held : MeshCounts{held.vertices + detail.vertices(), detail.triangles(levels).size()};
     const bool grouped = packet.kind == PacketKind::tracked && state.header->version >= grouped_version;
     const auto place = grouped ? read_group_place(packet.payload) : Result<GroupPlace>();
     // One is shown, even if an earlier packet brought it.

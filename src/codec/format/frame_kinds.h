@@ -68,8 +68,8 @@ inline bool is_referred(const PacketHeader& packet, const FrameRules& rules) {
     return rules.referred && (!packet.has(packet_flag::flags_valid) || packet.has(packet_flag::referred));
 }
 
-// Whether a decoder at its defaults accepts a stream whose frames, of this kind, are as large: an error of kind limit that
-// says why not.
+// Whether a decoder at its defaults accepts a stream whose frames, of this kind, are as large: an error of kind limit
+// that says why not.
 Result<void> check_default_limits(FrameType type, MeshCounts shown);
 
 }  // namespace htvm::internal

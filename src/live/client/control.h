@@ -36,13 +36,20 @@ enum class CloseCode : std::uint16_t {
 // A word, to count by.
 constexpr const char* name_of(CloseCode code) {
     switch (code) {
-        case CloseCode::ended: return "ended";
-        case CloseCode::shut_down: return "shut_down";
-        case CloseCode::refused: return "refused";
-        case CloseCode::too_large: return "too_large";
-        case CloseCode::try_later: return "try_later";
-        case CloseCode::continued: return "continued";
-        case CloseCode::taken_over: return "taken_over";
+        case CloseCode::ended:
+            return "ended";
+        case CloseCode::shut_down:
+            return "shut_down";
+        case CloseCode::refused:
+            return "refused";
+        case CloseCode::too_large:
+            return "too_large";
+        case CloseCode::try_later:
+            return "try_later";
+        case CloseCode::continued:
+            return "continued";
+        case CloseCode::taken_over:
+            return "taken_over";
     }
     return "other";
 }

@@ -57,9 +57,9 @@ struct Site {
 boost::asio::awaitable<Response> answer(const Site& site, const Route& route, const Request& request,
                                         const Client& client);
 
-// Publishes or watches, or says why not; then the connection has ended. route: a live one. has_place: whether the client
-// may have another connection.
-boost::asio::awaitable<void> carry(const Site& site, Line line, Request request, Route route,
-                                   Client client, bool has_place);
+// Publishes or watches, or says why not; then the connection has ended. route: a live one. has_place: whether the
+// client may have another connection.
+boost::asio::awaitable<void> carry(const Site& site, Line line, Request request, Route route, Client client,
+                                   bool has_place);
 
 }  // namespace htvm::live

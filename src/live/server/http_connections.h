@@ -1,5 +1,6 @@
-// The connections of the server, each from its first byte to its end: whom a proxy says it is for, TLS, then one request after the other and its
-// response, until the client or a time limit ends it, or a request makes it carry a live stream.
+// The connections of the server, each from its first byte to its end: whom a proxy says it is for, TLS, then one
+// request after the other and its response, until the client or a time limit ends it, or a request makes it carry a
+// live stream.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
