@@ -22,8 +22,10 @@
  *
  * Threads. Each handle has a thread of its own that reads and writes the line. Of the caller's threads one at a time
  * may use a handle, but for htvm_watcher_stop(), which any may call at any time until _destroy is called; different
- * threads may use different handles at the same time. No function calls the caller back. Lifetimes. Texts and bytes
- * that are passed in are copied; a _destroy ends the connection at once. Handles are allocated by C++'s operator new.
+ * threads may use different handles at the same time. No function calls the caller back.
+ *
+ * Lifetimes. Texts and bytes that are passed in are copied; a _destroy ends the connection at once. Handles are
+ * allocated by C++'s operator new.
  */
 #ifndef HTVM_HTVM_LIVE_H
 #define HTVM_HTVM_LIVE_H
