@@ -69,6 +69,9 @@ set_source_files_properties(${player_cpp} PROPERTIES OBJECT_DEPENDS "${player_pa
 htvm_floor(live_client DIRECTORY src/live/client
   LINKS htvm_decoder htvm_core Boost::headers OpenSSL::SSL nlohmann_json::nlohmann_json)
 htvm_library(live FLOORS live_client LINKS decoder NEEDS OpenSSL::SSL)
+# The same for C (htvm/htvm_live.h), by itself as all libraries for C are.
+htvm_floor(c_live SOURCES src/c_api/c_live.cpp LINKS htvm_c_decoder htvm_live_client)
+htvm_library(c_live C FLOORS core entropy decoder c_decoder live_client c_live NEEDS OpenSSL::SSL)
 file(GLOB hub_sources CONFIGURE_DEPENDS src/live/hub/*.cpp)
 list(FILTER hub_sources EXCLUDE REGEX "/${other_nats_source}$")
 htvm_floor(live_hub SOURCES ${hub_sources} LINKS htvm_live_client ${nats_library})

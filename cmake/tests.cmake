@@ -65,7 +65,7 @@ htvm_tests(sound htvm_sound)
 htvm_tests(container htvm_container)
 htvm_tests(texture htvm_texture htvm_texture_baking htvm_images)
 htvm_tests(metrics htvm_metrics)
-htvm_tests(live htvm_live)
+htvm_tests(live htvm_live htvm_c_live)
 htvm_tests(apps htvm_app)
 htvm_tests(lab htvm_laboratory)
 foreach(name command_line captures capture_kinds recordings efforts textures textured_streams synthetic coverage outputs editing jobs chunks audio mp4 gltf pictures publish serve use)
@@ -82,6 +82,8 @@ add_test(NAME c_examples COMMAND ${PROJECT_SOURCE_DIR}/tests/c_api/examples.sh $
 add_test(NAME pages COMMAND ${PROJECT_SOURCE_DIR}/tests/install/pages.sh $<TARGET_FILE:htvm> $<TARGET_FILE:htvm-lab>)
 # Every link in the documents leads to a file and a heading.
 add_test(NAME docs_links COMMAND ${PROJECT_SOURCE_DIR}/tests/docs/links.py ${PROJECT_SOURCE_DIR})
+# The dashboard and the alerts ask for what hubs count.
+add_test(NAME docs_monitoring COMMAND ${PROJECT_SOURCE_DIR}/tests/docs/monitoring.py)
 add_test(NAME bench COMMAND ${PROJECT_SOURCE_DIR}/tests/bench/run.sh)
 set_tests_properties(bench PROPERTIES SKIP_RETURN_CODE 77)
 # Which folder includes which; and that this check, and the rest of ./dev check, find what they should.

@@ -5,6 +5,8 @@ Called by pip as a build backend (PEP 517), or as a program:
     python3 htvm_wheel.py LIBRARY FOLDER     the wheel. LIBRARY: libhtvm.so or htvm.dll, as CMake's target htvm_python
                                              makes it; for pip, HTVM_LIBRARY names it, or CMake is run
     python3 htvm_wheel.py --source FOLDER    the source distribution
+
+HTVM_LIVE_LIBRARY names libhtvm_c_live.so, for live streams; without it the package asks for it only where it is used.
 """
 
 from __future__ import annotations
@@ -68,6 +70,8 @@ def write_wheel(library: Path, folder: Path) -> str:
     files: Dict[str, bytes] = {f"htvm/{path.name}": path.read_bytes()
                                for path in sorted((here / "htvm").iterdir()) if path.suffix in (".py", ".typed")}
     files[f"htvm/{library_name(platform)}"] = code
+    if "HTVM_LIVE_LIBRARY" in os.environ:
+        files["htvm/libhtvm_c_live.so"] = Path(os.environ["HTVM_LIVE_LIBRARY"]).read_bytes()
     files[f"{info}/METADATA"] = metadata().encode()
     files[f"{info}/WHEEL"] = f"Wheel-Version: 1.0\nGenerator: htvm\nRoot-Is-Purelib: false\nTag: {tag}\n".encode()
     files[f"{info}/LICENSE"] = (project / "LICENSE").read_bytes()

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <utility>
 
+#include "codec/format/frame_kinds.h"
 #include "command_line/terminal.h"
 
 namespace htvm::app {
@@ -42,6 +43,10 @@ Result<void> take_coded(Pass& pass) {
     auto& summary = pass.summary;
     std::size_t coded = 0;
     for (const auto& [info, cost] : pass.encoder.coded_frames()) {
+        if (auto fits = internal::check_default_limits(info.type, {info.vertices, info.triangles}); !fits)
+            warn_of_frame(pass, FrameWarnings::large,
+                          fmt::format("frame {} is refused by players and commands that are not told otherwise: {}",
+                                      info.frame, fits.error().message));
         if (pass.pictures && pass.write && pass.pictures->bakes()) {
             const auto repeated = pass.encoder.repeated_vertices(coded);
             pass.pictures->show(info.frame, pass.encoder.reconstruction(coded), {repeated.begin(), repeated.end()});

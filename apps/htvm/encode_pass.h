@@ -46,12 +46,12 @@ void add(Summary& summary, Summary behind);
 // Warnings of single frames, from any thread: of hundreds of a kind the first few tell enough.
 class FrameWarnings {
 public:
-    enum Kind : std::uint8_t { bad, missing, dropped, slower_line };
+    enum Kind : std::uint8_t { bad, missing, dropped, slower_line, large };
     void tell(Kind kind, const std::string& line);
 
 private:
     std::mutex mutex_;
-    std::array<std::size_t, 4> told_{};
+    std::array<std::size_t, 5> told_{};
 };
 
 struct Pass {

@@ -47,7 +47,7 @@ Result<void> run_index(const Options& options) {
         }
         if (auto written = output->write(*packet); !written) return written;
     }
-    if (auto fine = check_whole(*input, options.input); !fine) return fine;
+    if (auto fine = check_whole_but_for_end(*input, options.input); !fine) return fine;
     if (frames == 0) return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream, or has no frames");
     if (auto finished = output->finish(); !finished) return finished;
     if (path == "-") return {};
@@ -67,7 +67,9 @@ void add_index(CLI::App& app, Run& run) {
     command->add_flag("--bounds", options->bounds, "Decode all frames for their bounds (default: only an index's own)");
     add_decoder_limits(*command, options->limits);
     command->footer(
-        "Files that 'htvm encode', 'cut' and 'join' write have one. Recorded live streams do not.\n"
+        "Files that 'htvm encode', 'cut' and 'join' write have one. Recordings whose hub was killed do not; if their "
+        "end is torn,\n"
+        "it is left out.\n"
         "Example:\n"
         "  htvm index recorded.htvm");
     command->callback([options, &run] {

@@ -43,7 +43,7 @@ Result<void> add_stream(StreamJoin& join, const std::string& path, const Decoder
             if (auto ok = headers.decode(*packet); !ok) return tl::unexpected(ok.error());
         if (auto ok = join.take(std::move(*packet)); !ok) return ok;
     }
-    if (auto fine = check_whole(*input, path); !fine) return fine;
+    if (auto fine = check_whole_but_for_end(*input, path); !fine) return fine;
     if (!join.has_frames()) return fail(ErrorKind::corrupt_stream, path + " is not an htvm stream, or has no frames");
     tell_of_pause(join, path);
     return {};

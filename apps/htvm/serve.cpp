@@ -1,10 +1,16 @@
 // htvm serve: a hub of live streams, and a folder of streams, for others to watch, with a page that plays them.
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <memory>
 #include <optional>
 
@@ -12,6 +18,7 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "live/server/credentials.h"
+#include "live/server/http_request.h"
 #include "live/server/player_files.h"
 #include "live/server/recorder.h"
 #include "live/server/server.h"
@@ -25,6 +32,7 @@ struct Options {
     live::RecorderOptions recorder;
     std::optional<std::string> add_publisher{};  // only to make a token
     std::string congestion_control = "bbr";
+    std::string access_log{};  // a file, or "-"
     bool same_site = false, add_link_key = false, json = false;
     Options() {
         server.port = 8080;
@@ -60,6 +68,64 @@ void write_event(const live::Event& event, bool json) {
 
 // So many events of a name can a person read.
 constexpr std::uint64_t told_each_second = 20;
+
+// A file to which others may write, too, and which is opened anew where another program has moved it away.
+class AppendedFile {
+public:
+    explicit AppendedFile(std::string path) : path_(std::move(path)) {}
+    Result<void> open() {
+        std::unique_ptr<std::FILE, Close> file(std::fopen(path_.c_str(), "ae"));
+        if (!file) return fail(ErrorKind::bad_input, fmt::format("cannot write {}: {}", path_, std::strerror(errno)));
+        file_ = std::move(file);
+        return {};
+    }
+    void write(const std::string& line) {
+        fmt::print(file_.get(), "{}\n", line);
+        std::fflush(file_.get());
+    }
+
+private:
+    struct Close {
+        void operator()(std::FILE* file) const { std::fclose(file); }
+    };
+    std::string path_;
+    std::unique_ptr<std::FILE, Close> file_;
+};
+
+// Every request, as its own line.
+Result<void> open_access_log(const Options& options, live::ServerOptions& server) {
+    if (options.access_log.empty()) return {};
+    const auto line_of = [json = options.json](const live::Event& event) {
+        const auto now = std::chrono::system_clock::now();
+        return json ? json_line(event, now) : text_line(event, now);
+    };
+    if (options.access_log == "-") {
+        server.access_log = [line_of](const live::Event& event) {
+            fmt::print("{}\n", line_of(event));
+            std::fflush(stdout);
+        };
+        return {};
+    }
+    const auto file = std::make_shared<AppendedFile>(options.access_log);
+    if (auto opened = file->open(); !opened) return opened;
+    server.access_log = [file, line_of](const live::Event& event) { file->write(line_of(event)); };
+    server.reload = [file] {
+        if (const auto opened = file->open(); !opened) warn(opened.error().message);
+    };
+    return {};
+}
+
+// The socket that systemd hands over, if it does (sd_listen_fds); -1: none.
+int inherited_socket() {
+    constexpr int first = 3;
+    const auto number = [](const char* name) {
+        const char* text = std::getenv(name);
+        return text ? live::whole_number(text).value_or(0) : 0;
+    };
+    if (number("LISTEN_PID") != static_cast<std::uint64_t>(getpid()) || number("LISTEN_FDS") == 0) return -1;
+    fcntl(first, F_SETFD, FD_CLOEXEC);
+    return first;
+}
 
 // Where to open it in a browser.
 std::string address_of(const live::ServerOptions& server, std::uint16_t port) {
@@ -100,6 +166,8 @@ Result<void> serve(const Options& options) {
     server.admission.loopback_names = for_this_machine;
     if (for_this_machine) server.admission.hosts.push_back(server.address);
     server.admission.other_sites = !options.same_site && !for_this_machine && server.admission.origins.empty();
+    server.listening_socket = inherited_socket();
+    if (auto opened = open_access_log(options, server); !opened) return opened;
     if (options.congestion_control != "system") server.congestion_control = options.congestion_control;
     server.hub = &hub;
     std::optional<live::Recorder> recorder;
@@ -236,6 +304,23 @@ void add_access_options(CLI::App& command, Options& options) {
     command.add_flag("--same-site", options.same_site, "Pages of no other site may read and watch")->excludes(origins);
 }
 
+void add_proxies(CLI::App& command, Options& options) {
+    auto& server = options.server;
+    auto* trusted = command
+                        .add_option("--trust-proxy", server.trusted_proxies,
+                                    "A web server or load balancer before the hub, by its address or network such as "
+                                    "10.0.0.0/8: whom it names in X-Forwarded-For counts as the client; may be given "
+                                    "more than once (default: none is believed)")
+                        ->type_name("ADDRESS")
+                        ->allow_extra_args(false);
+    command
+        .add_flag("--proxy-protocol", server.proxy_protocol,
+                  "Connections from there begin with a header of the PROXY protocol, version 1 or 2")
+        ->needs(trusted);
+    command.add_flag("--reuse-port", server.share_port,
+                     "Other hubs may listen on the same port: one that is started takes over before this one ends");
+}
+
 void add_recording(CLI::App& command, Options& options) {
     auto* folder = command
                        .add_option("--record", options.recorder.folder,
@@ -248,6 +333,11 @@ void add_recording(CLI::App& command, Options& options) {
             "Begin another file after so many minutes (default: a file a session)")
         ->check(CLI::Range(1, 100000))
         ->needs(folder);
+    command
+        .add_option("--access-log", options.access_log,
+                    "Write each request to this file, or to standard output (-); with --json as JSON. SIGHUP opens the "
+                    "file anew")
+        ->type_name("FILE");
     command.add_flag("--metrics-anyone", options.server.admission.metrics_anyone,
                      "Show /metrics to everybody (default: to programs on this machine)");
 }
@@ -317,6 +407,8 @@ void add_serve(CLI::App& app, Run& run) {
     add_nats_options(*command, server.nats);
     under("Who may publish and watch");
     add_access_options(*command, *options);
+    under("Behind other servers");
+    add_proxies(*command, *options);
     under("Recording and watching over it");
     add_recording(*command, *options);
     command->add_flag("--json", options->json,

@@ -38,15 +38,15 @@ std::function<void(const std::string&)> warn_once() {
     };
 }
 
-Result<live::Watcher> open_watcher(const std::string& address, std::size_t max_packet_bytes, const HubTrust& trust) {
+Result<Watcher> open_watcher(const std::string& address, std::size_t max_packet_bytes, const HubTrust& trust) {
     watch_for_interruption();
-    live::WatcherOptions options;
+    WatcherOptions options;
     options.certificates = trust.certificates;
     options.insecure = trust.insecure;
     options.largest_packet = std::min(max_packet_bytes, options.largest_packet);
     options.is_stopped = [] { return interruption() != 0; };
     options.trouble = warn_once();
-    return live::Watcher::open(address, options);
+    return Watcher::open(address, options);
 }
 
 }  // namespace
@@ -186,7 +186,10 @@ std::optional<Packet> StreamInput::next() {
         return std::nullopt;
     }
     for (;;) {
-        if (auto packet = reader_.pull()) return packet;
+        if (auto packet = reader_.pull()) {
+            damaged_before_ = reader_.damaged_bytes();
+            return packet;
+        }
         if (at_end_) return std::nullopt;
         at_end_ = !read_some();
     }
@@ -202,6 +205,14 @@ Result<void> check_whole(const StreamInput& input, const std::string& path, cons
                                                            counted(input.damaged_bytes(), "byte"), advice));
     if (input.cut_short_bytes() > 0)
         return fail(ErrorKind::corrupt_stream, fmt::format("{} ends in the middle of a packet; {}", path, advice));
+    return {};
+}
+
+Result<void> check_whole_but_for_end(const StreamInput& input, const std::string& path) {
+    const auto torn = input.torn_bytes();
+    if (torn == 0 || torn != input.damaged_bytes() + input.cut_short_bytes() || input.oversized_packets() > 0)
+        return check_whole(input, path);
+    warn(fmt::format("{} ends in {} that are no whole packet, which are left out", path, counted(torn, "byte")));
     return {};
 }
 
@@ -413,6 +424,10 @@ void add_decoder_limits(CLI::App& command, DecoderOptions& limits) {
     command.add_option("--max-vertices", limits.max_vertices, "Most vertices of a frame (default 4194304)")
         ->group(heading::limits);
     command.add_option("--max-triangles", limits.max_triangles, "Most triangles of a frame (default 8388608)")
+        ->group(heading::limits);
+    command
+        .add_option("--max-vertices-per-byte", limits.max_vertices_per_byte,
+                    "Most work for each byte of the stream so far, counted in vertices shown (default 4096)")
         ->group(heading::limits);
     add_packet_limits(command, limits);
 }

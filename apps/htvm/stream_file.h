@@ -17,8 +17,8 @@
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
 #include "htvm/stream_index.hpp"
+#include "htvm/watcher.hpp"
 #include "io/output_file.h"
-#include "live/client/watcher.h"
 #include "pacing.h"
 #include "publishing.h"
 
@@ -50,6 +50,11 @@ public:
     std::uint64_t oversized_packets() const { return reader_.oversized_packets(); }
     // At the end: bytes of a truncated packet.
     std::size_t cut_short_bytes() const { return at_end_ ? reader_.pending_bytes() : 0; }
+    // Bytes behind the last whole packet, at the end: what a program left that was killed while it wrote, or a machine
+    // that lost its power.
+    std::uint64_t torn_bytes() const {
+        return at_end_ ? damaged_bytes() - damaged_before_ + reader_.pending_bytes() : 0;
+    }
     // From now on these packets come first, then those of the file from this place on.
     void go_on_with(std::vector<Packet> first, std::uint64_t offset);
 
@@ -57,18 +62,22 @@ private:
     bool read_some();
     bool begin_standard();
     std::shared_ptr<std::ifstream> file_ = std::make_shared<std::ifstream>();
-    std::optional<live::Watcher> watcher_;
+    std::optional<Watcher> watcher_;
     std::uint64_t max_packet_bytes_ = 0;
     std::optional<Error> refusal_;
     std::shared_ptr<Mp4Packets> mp4_;
     bool standard_ = false, at_end_ = false, begun_ = false;
     PacketReader reader_;
+    std::uint64_t damaged_before_ = 0;  // when the last packet was read
     std::deque<Packet> first_;
 };
 
 // An error if the input, as far as it was read, was not whole. advice: the end of its sentence.
 Result<void> check_whole(const StreamInput& input, const std::string& path,
                          const std::string& advice = "'htvm verify' tells more");
+
+// For commands that write the stream anew: likewise, but an end that is torn is left out, which a warning says.
+Result<void> check_whole_but_for_end(const StreamInput& input, const std::string& path);
 
 // A file is there once it is finished: until then its packets are in a file beside it, and what was there before stays.
 // It then begins with an index; those at the end of streams are left out of it. An .mp4, or segments and their

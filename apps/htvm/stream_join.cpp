@@ -1,6 +1,8 @@
 #include "stream_join.h"
 
 #include <algorithm>
+#include <limits>
+#include <string>
 #include <utility>
 
 #include "htvm/decoder.hpp"
@@ -8,8 +10,9 @@
 namespace htvm::app {
 
 Packet StreamJoin::moved(Packet packet) const {
-    packet.frame = packet.frame - stream_.first + stream_.number;
-    if (packet.kind != PacketKind::sequence) packet.reference = packet.reference - stream_.first + stream_.number;
+    const auto by = static_cast<std::uint32_t>(stream_.number) - stream_.first;
+    packet.frame += by;
+    if (packet.kind != PacketKind::sequence) packet.reference += by;
     packet.timestamp_us = static_cast<std::int64_t>(static_cast<std::uint64_t>(packet.timestamp_us) +
                                                     static_cast<std::uint64_t>(stream_.later_us));
     return packet;
@@ -39,7 +42,17 @@ void StreamJoin::begin_sequence(const Packet& frame) {
     header_ = stream_.in_force->payload;
 }
 
+// Numbers have 32 bits: those of one sequence must neither wrap nor come before its first one.
+Result<void> StreamJoin::check_number(const Packet& frame) const {
+    constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
+    if (frame.frame >= stream_.first && stream_.number + (frame.frame - stream_.first) <= most) return {};
+    return fail(ErrorKind::limit, "frame " + std::to_string(frame.frame) +
+                                      " cannot be numbered on behind the frames before it: frames of one sequence have "
+                                      "numbers below 2^32");
+}
+
 Result<void> StreamJoin::write_frame(Packet packet) {
+    if (auto ok = check_number(packet); !ok) return ok;
     auto frame = moved(std::move(packet));
     if (stream_.header) {
         auto header = moved(*std::exchange(stream_.header, std::nullopt));
@@ -50,7 +63,7 @@ Result<void> StreamJoin::write_frame(Packet packet) {
     for (auto& before : std::exchange(stream_.waiting, {}))
         if (auto ok = output_.write(moved(std::move(before))); !ok) return ok;
     ++frames_;
-    next_number_ = std::max(next_number_, frame.frame + 1);
+    next_number_ = std::max(next_number_, std::uint64_t{frame.frame} + 1);
     last_us_ = frame.timestamp_us;
     return output_.write(frame);
 }

@@ -35,16 +35,18 @@ private:
     struct Stream {
         FrameNumbers numbers;
         RunningTime time;
-        std::optional<Packet> in_force;       // its sequence header
-        std::optional<Packet> header;         // waits for the frame behind it
-        std::vector<Packet> waiting;          // likewise, codebooks and others
-        std::uint32_t first = 0, number = 0;  // own number of its sequence's first frame, and that in the output
-        std::int64_t later_us = 0;            // added to timestamps
+        std::optional<Packet> in_force;  // its sequence header
+        std::optional<Packet> header;    // waits for the frame behind it
+        std::vector<Packet> waiting;     // likewise, codebooks and others
+        std::uint32_t first = 0;         // own number of its sequence's first frame,
+        std::uint64_t number = 0;        // and that in the output
+        std::int64_t later_us = 0;       // added to timestamps
         bool begun = false;
         std::optional<double> pause_seconds;
     };
     void begin_sequence(const Packet& frame);
     Packet moved(Packet packet) const;
+    Result<void> check_number(const Packet& frame) const;
     Result<void> write_frame(Packet packet);
 
     StreamOutput& output_;
@@ -52,7 +54,7 @@ private:
     std::optional<std::vector<std::uint8_t>> header_;  // payload of the one in force in the output
     std::uint64_t frames_ = 0;
     std::size_t sequences_ = 0;
-    std::uint32_t next_number_ = 0;  // in the sequence in force
+    std::uint64_t next_number_ = 0;  // in the sequence in force
     std::int64_t last_us_ = 0;
 };
 

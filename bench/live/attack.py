@@ -3,7 +3,9 @@
 others attack the hub, all on this machine. It prints the gaps between frames, how often the viewer was sent away, and
 the hub's memory.
 
-usage: attack.py HTVM ATTACK [--seconds 20]
+usage: attack.py HTVM ATTACK [--seconds 20] [--realtime]
+
+--realtime: hub, publisher and viewer come before whatever else runs on the machine, the attackers included (chrt)
 
   none      nobody attacks
   memory    who has a token for one stream opens 75 connections and sends 14 MB of a message on each, again and again
@@ -164,7 +166,8 @@ def measure(options):
         anna, eve = token_of(options.htvm, publishers, "anna"), token_of(options.htvm, publishers, "eve")
         others = [token_of(options.htvm, publishers, f"other{i}") for i in range(250)] \
             if options.attack == "streams" else []
-        with hubs.started([options.htvm, "serve", "--files", served, "--port", 0, "--publishers", publishers],
+        before = ["chrt", "-r", "10"] if options.realtime else []
+        with hubs.started([*before, options.htvm, "serve", "--files", served, "--port", 0, "--publishers", publishers],
                           stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as hub:
             port = int(hub.stdout.readline().rsplit(":", 1)[1].strip("/\n"))
             with open(stream, "rb") as file:
@@ -173,10 +176,10 @@ def measure(options):
             for i, token in enumerate(others):
                 kept.append(publish.connect(port, f"other{i}", token, False))
                 kept[-1].sendall(publish.websocket_message(publish.renumbered(begin[0], 0, 0)))
-            with hubs.started([sys.executable, os.path.join(hubs.FOLDER, "publish.py"), stream, "anna", port,
+            with hubs.started([*before, sys.executable, os.path.join(hubs.FOLDER, "publish.py"), stream, "anna", port,
                                "--token", anna], stderr=subprocess.DEVNULL) as publisher:
                 time.sleep(1)
-                watching = hubs.started([sys.executable, __file__, options.htvm, "watch", "--port", port,
+                watching = hubs.started([*before, sys.executable, __file__, options.htvm, "watch", "--port", port,
                                          "--seconds", options.seconds], stdout=subprocess.PIPE, text=True)
                 with watching as viewer:
                     time.sleep(1)
@@ -211,6 +214,7 @@ def main():
     parser.add_argument("htvm")
     parser.add_argument("attack", choices=["none", "memory", "list", "streams", "chains", "pings", "watch"])
     parser.add_argument("--seconds", type=float, default=20)
+    parser.add_argument("--realtime", action="store_true")
     parser.add_argument("--port", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
     (watch if options.attack == "watch" else measure)(options)

@@ -1,5 +1,7 @@
 // Sound in a stream: packets of Opus (RFC 6716) beside the frames, for programs that make, cut or check streams. The
 // decoder passes over them; players hand them to a decoder of Opus. docs/bitstream.md, section 13, is normative.
+//
+// Threads and lifetimes. Functions keep no state: any thread may call them at any time. What they return is a copy.
 #pragma once
 
 #include <cstdint>

@@ -12,6 +12,9 @@
 // T-frames refer to the reference, the last I- or TP-frame, or, by default, to the previous T-frame: then a lost one
 // costs those up to the next frame that refers to the reference alone, or is one. A decoder may start at any I-frame
 // once it has the sequence header.
+//
+// Threads and lifetimes. A decoder is used by one thread at a time; different ones at the same time. Its own threads
+// (threads.hpp) end with it.
 #pragma once
 
 #include <cstdint>
@@ -43,6 +46,11 @@ struct DecoderOptions {
     // an upper bound from the counts of vertices and triangles: about 1 KB per vertex of an ordinary mesh. A plugged-in
     // coder of I-frames uses its own memory in addition.
     std::uint64_t max_memory = std::uint64_t{1} << 32;
+    // Frames that refer to others take few bytes, however large the mesh is. So the work of decoding them is held
+    // against the bytes of all packets so far, in vertices: those shown, and those of what the frame refers to, once
+    // for a P-frame, 4 times for a T- and an EP-frame, 16 times for a TP-frame; half of the triangles where these are
+    // more.
+    std::uint64_t max_vertices_per_byte = 4096;
     // How many levels of detail are shown below the mesh that frames refer to, where a stream has any; with fewer, a
     // frame takes less time and has fewer vertices.
     std::uint32_t detail_levels = 9;

@@ -8,6 +8,9 @@
 //       store[dependencies.push(packet)] = bytes;
 //       remove from the store what is not in dependencies.kept();
 //   when a viewer joins: send store[place] for each place in dependencies.kept(), then each packet as it comes
+//
+// Threads and lifetimes. One object is used by one thread at a time. Spans that it gives are valid until the next call
+// that changes it.
 #pragma once
 
 #include <array>

@@ -8,6 +8,10 @@
 // With EncoderOptions::latency_frames a push queues the packets of an earlier frame. Where T-frames are coded in groups
 // (TrackedOptions::group), frames are held until their group is whole: a push may queue the packets of none, or of
 // several. Memory is bounded by a few frames, whatever the length of the sequence.
+//
+// Threads and lifetimes. An encoder is used by one thread at a time; different ones at the same time. Its own threads
+// (threads.hpp) end with it. What push() is given is not needed behind it, and what pull() gives is the caller's; what
+// else it lends is valid until the next call that changes it.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,8 @@
 // The encoder's options, each with its default and meaning. Their ranges, and their names elsewhere, are in one list
 // (option_list.hpp, docs/options.md). A stream made with the defaults is the one that `htvm encode` makes with its own.
+//
+// Threads and lifetimes. Plain values: copies are independent, but for a runner and a plugged-in coder, which copies
+// share.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,6 @@
 // What encoder and decoder report about a frame: its type, why it was sent, and how its bytes are distributed.
+//
+// Threads and lifetimes. Plain values and constants: any thread may read them at any time.
 #pragma once
 
 #include <array>

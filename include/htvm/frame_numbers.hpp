@@ -1,5 +1,7 @@
 // Numbers the frames of a whole stream. Each of its sequences has its own numbers; where these start again, the frames
 // are numbered on from the sequence before.
+//
+// Threads and lifetimes. One object is used by one thread at a time; copies are independent.
 #pragma once
 
 #include <cstddef>

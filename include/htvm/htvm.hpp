@@ -1,9 +1,9 @@
 // htvm: compression of human time-varying meshes. This header brings the whole C++ API, and needs nothing but the
 // standard library and tl/expected.hpp.
 //
-// htvm::decoder and htvm::encoder have what it declares, except for: Publisher, in htvm::live (publisher.hpp);
-// PictureEncoder, PictureDecoder, OwnPlanes and image_of(), in htvm::texture (picture_*.hpp); draco_intra_coder(), in
-// htvm::draco (intra_coder.hpp). These link other libraries.
+// htvm::decoder and htvm::encoder have what it declares, except for: Publisher and Watcher, in htvm::live
+// (publisher.hpp, watcher.hpp); PictureEncoder, PictureDecoder, OwnPlanes and image_of(), in htvm::texture
+// (picture_*.hpp); draco_intra_coder(), in htvm::draco (intra_coder.hpp). These link other libraries.
 #pragma once
 
 #include "htvm/audio.hpp"            // IWYU pragma: export
@@ -32,3 +32,4 @@
 #include "htvm/texture.hpp"          // IWYU pragma: export
 #include "htvm/texture_layout.hpp"   // IWYU pragma: export
 #include "htvm/threads.hpp"          // IWYU pragma: export
+#include "htvm/watcher.hpp"          // IWYU pragma: export

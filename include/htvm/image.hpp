@@ -1,4 +1,6 @@
 // An image of 8-bit colours, as textures and pictures are.
+//
+// Threads and lifetimes. A plain value: copies are independent.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,7 @@
 // Lets another static mesh coder code I-frames (paper, section III-C).
+//
+// Threads and lifetimes. The functions of a coder are called by whichever thread uses the encoder or decoder, and by
+// several at once where several share it.
 #pragma once
 
 #include <cstdint>

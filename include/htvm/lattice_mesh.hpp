@@ -1,5 +1,7 @@
 // A mesh in the codec's own form: integers only, so that encoder and decoder agree to the bit (docs/bitstream.md,
 // section 1). This is also what a plugged-in static coder codes.
+//
+// Threads and lifetimes. Plain values: copies are independent.
 #pragma once
 
 #include <array>

@@ -1,4 +1,7 @@
 // A mesh as captured or as decoded: one frame of a human time-varying mesh.
+//
+// Threads and lifetimes. Plain values: copies are independent. A MeshView lends arrays of somebody else, and is valid
+// as long as these.
 #pragma once
 
 #include <array>

@@ -9,6 +9,8 @@
 //
 // Not in the list, because they are not numbers, words or switches: the profile, runner, floor, metadata, global shift,
 // skeleton, radii, intra_coder, first_pass, texture.
+//
+// Threads and lifetimes. The list is constant, lives as long as the program, and may be read by any thread at any time.
 #pragma once
 
 #include <cstdint>

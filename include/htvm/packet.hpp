@@ -1,5 +1,8 @@
 // The stream: self-delimiting packets. A sequence header comes first, then at least one packet per frame.
 // docs/bitstream.md is normative.
+//
+// Threads and lifetimes. A PacketReader is used by one thread at a time; functions keep no state. Packets own their
+// bytes.
 #pragma once
 
 #include <cstddef>

@@ -6,6 +6,9 @@
 //   draw(mesh, *pictures.image());
 //
 // Part of the library htvm::texture, which needs libaom, libvpx and libdav1d.
+//
+// Threads and lifetimes. One object is used by one thread at a time. An image that it lends is valid until its next
+// call.
 #pragma once
 
 #include <cstdint>

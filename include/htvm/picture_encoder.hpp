@@ -2,6 +2,8 @@
 // without those that follow it, so that a live stream waits for nothing.
 //
 // Part of the library htvm::texture, which needs libaom, libvpx and libdav1d.
+//
+// Threads and lifetimes. One object is used by one thread at a time. What it gives is the caller's.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,6 @@
 // The planes of a video's picture, and their conversion from and to red, green, blue (docs/bitstream.md, section 14).
+//
+// Threads and lifetimes. Functions keep no state. A view of planes lends them, and is valid as long as these.
 #pragma once
 
 #include <array>

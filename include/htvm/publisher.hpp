@@ -9,6 +9,10 @@
 // The encoder is never held up: what the line does not take is dropped by the rule of dependency.hpp, so that what does
 // arrive can be decoded. A lost line or a restarted hub ends nothing: the publisher connects again, to the next of the
 // hubs that it knows, and goes on with what the newest frame needs.
+//
+// Threads and lifetimes. It has a thread of its own, which reads and writes the line, and ends with it. Of the caller's
+// threads one at a time may use it, but for state() and wants_key_frame(), which any may call at any time. Packets that
+// it is given are copied.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,6 @@
 // Errors are values: every function that can fail returns Result<T>.
+//
+// Threads and lifetimes. Plain values: copies are independent.
 #pragma once
 
 #include <string>

@@ -1,5 +1,7 @@
 // The time of frames in a whole stream: each of its sequences begins where the one before ends, when its last frame has
 // lasted as long as a frame does.
+//
+// Threads and lifetimes. One object is used by one thread at a time; copies are independent.
 #pragma once
 
 #include <cstdint>

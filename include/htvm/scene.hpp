@@ -1,4 +1,6 @@
 // What a stream says about its capture besides the meshes: the up axis, bounds, and texts.
+//
+// Threads and lifetimes. Plain values: copies are independent.
 #pragma once
 
 #include <array>

@@ -1,4 +1,6 @@
 // The skeleton of a mesh sequence: its bones, given once, and its pose in every frame.
+//
+// Threads and lifetimes. Plain values: copies are independent.
 #pragma once
 
 #include <array>

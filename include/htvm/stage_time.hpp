@@ -1,4 +1,6 @@
 // How long the stages of a frame take.
+//
+// Threads and lifetimes. Plain values: copies are independent.
 #pragma once
 
 namespace htvm {

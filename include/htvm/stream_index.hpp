@@ -1,5 +1,8 @@
 // The index at the beginning of a finished file: its duration, its bounds, and where decoding can start.
 // A live stream has none. docs/bitstream.md, section 9.
+//
+// Threads and lifetimes. A StreamIndexer is used by one thread at a time; functions keep no state. What they return is
+// a copy.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,9 @@
 // The pictures of a textured stream: packets beside the frames, each with the picture of one frame, for programs that
 // make, cut, check or show streams. The decoder passes over them; players hand their bytes to a decoder of video or of
 // images. docs/bitstream.md, section 14, is normative.
+//
+// Threads and lifetimes. Functions keep no state: any thread may call them at any time. A TexturePicture lends the
+// bytes that it was read from.
 #pragma once
 
 #include <array>

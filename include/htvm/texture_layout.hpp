@@ -1,4 +1,6 @@
 // How the meshes of a stream wear a texture.
+//
+// Threads and lifetimes. Plain values: copies are independent.
 #pragma once
 
 #include <cstdint>

@@ -6,6 +6,9 @@ HTVM_LIBRARY=$(realpath "$1")
 HTVM_PROGRAM=$(realpath "$2")
 export HTVM_LIBRARY HTVM_PROGRAM
 shift 2
+# Beside the program, where it was built.
+live=$(dirname "$HTVM_PROGRAM")/lib/libhtvm_c_live.so
+[ ! -e "$live" ] || export HTVM_LIVE_LIBRARY=${HTVM_LIVE_LIBRARY:-$live}
 here=$(cd "$(dirname "$0")" && pwd)
 export PYTHONDONTWRITEBYTECODE=1 PYTHONPATH=$here/..
 for python in python3 /usr/bin/python3; do

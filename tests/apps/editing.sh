@@ -219,6 +219,26 @@ expect 3 "--first 5 --frames 3 copies" "$htvm" cut tail.htvm --first 5 --frames 
 expect 0 "numbers 4 to 7" "$htvm" cut tail.htvm --first 5 --frames 3 -o saved.htvm
 expect 0 "4 frames in 1 sequence, all sound" "$htvm" verify saved.htvm
 expect 3 "is not sound" "$htvm" verify capture/skeleton.json
+# What a program left that was killed while it wrote: index and join keep what is whole.
+expect 0 "ends in 100 bytes that are no whole packet, which are left out" "$htvm" index tail.htvm -o mended.htvm
+expect 0 "8 frames in 1 sequence, all sound, with an index" "$htvm" verify mended.htvm
+{ cat tail.htvm && head -c 5000 /dev/zero; } >zeros.htvm
+expect 0 "8 frames" "$htvm" index zeros.htvm
+expect 0 "all sound" "$htvm" verify zeros.htvm
+expect 0 "ends in 100 bytes" "$htvm" join tail.htvm part8.htvm -o mended.htvm
+expect 0 "12 frames in 1 sequence, all sound" "$htvm" verify mended.htvm
+# Numbers end below 2^32: the last frame of a stream is given the highest.
+python3 - live.htvm far.htvm <<'PYTHON'
+import struct, sys, zlib
+data, out, at, last = bytearray(open(sys.argv[1], "rb").read()), sys.argv[2], 0, None
+while at < len(data):
+    if data[at + 4] in (2, 3, 6, 7, 11): last = at
+    at += 36 + struct.unpack_from("<I", data, at + 24)[0]
+struct.pack_into("<I", data, last + 8, 2**32 - 1)
+struct.pack_into("<I", data, last + 28, zlib.crc32(data[last + 4:last + 28]))
+open(out, "wb").write(data)
+PYTHON
+expect 5 "frames of one sequence have numbers below 2^32" "$htvm" join far.htvm live.htvm -o numbered.htvm
 for command in cut join index; do
     cp walk.htvm kept.htvm
     case $command in

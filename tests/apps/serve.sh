@@ -62,6 +62,7 @@ start --config files.conf --files streams # the command line counts
 stop INT
 mkdir recordings
 start --record recordings --record-minutes 60
+[ "$(ask "$url/readyz")" = "200 ready" ] || fail "is not ready: $(ask "$url/readyz")"
 [ "$(ask "$url/healthz")" = "200 ok" ] || fail "is not well: $(ask "$url/healthz")"
 ask "$url/metrics" | grep -q '^htvm_recording_faults_total 0$' || fail "no metrics of recordings: $(ask "$url/metrics")"
 stop TERM
@@ -82,6 +83,36 @@ stop TERM
 start --files streams --host hub.example --origin https://A.example
 [ "$(asked Host=Hub.example:80)" = "200 None" ] || fail "the host that is told does not count"
 [ "$(asked Origin=https://a.example:443)" = "200 https://a.example:443" ] || fail "the site that is told may not read"
+stop TERM
+# Behind a proxy: whom it names counts, and is no program on this machine; each request is logged by that address.
+expect 2 "--proxy-protocol requires --trust-proxy" "$htvm" serve --proxy-protocol
+expect 1 "hub.example is no address or network" "$htvm" serve --port 0 --trust-proxy hub.example
+start --files streams --trust-proxy 127.0.0.0/8 --access-log access.log --json
+[ "$(asked X-Forwarded-For=198.51.100.1,192.0.2.7)" = "200 None" ] || fail "a proxy's request is not answered"
+stop TERM
+grep -q '"address":"192.0.2.7","method":"GET","path":"/files/person.htvm","status":200,"bytes":7' access.log ||
+    fail "the access log has $(cat access.log)"
+mv access.log access.log.1
+start --files streams --access-log access.log
+[ "$(ask "$url/files/person.htvm?signature=secret")" = "200 person" ] || fail "no file"
+mv access.log access.log.2
+kill -HUP $server
+for _ in $(seq 100); do [ -e access.log ] && break; sleep 0.05; done
+[ "$(ask "$url/files/nothing.htvm")" = "404 " ] || fail "another file"
+stop TERM
+grep -q "Z GET /files/person.htvm 200 7 bytes .* (127.0.0.1)$" access.log.2 || fail "the access log has $(cat access.log.2)"
+grep -q "GET /files/nothing.htvm 404" access.log || fail "after SIGHUP the access log has $(cat access.log)"
+grep -q secret access.log* && fail "the access log tells what is secret"
+# A new hub takes over from one that shares its port.
+start --files streams --reuse-port
+first=$server port=${url##*:} port=${port%/}
+"$htvm" serve --port "$port" --files streams --reuse-port >out2 2>err2 &
+second=$!
+for _ in $(seq 100); do grep -q http out2 && break; sleep 0.05; done
+kill -TERM $first
+wait $first || fail "the first hub ends with $?"
+[ "$(ask "$url/files/person.htvm")" = "200 person" ] || fail "nobody took over"
+server=$second
 stop TERM
 start
 grep -q "programs on this machine may publish" err || fail "does not say who may publish: $(cat err)"

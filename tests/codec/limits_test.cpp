@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "codec/enhanced_options.h"
+#include "codec/format/frame_kinds.h"
 #include "codec/format/frame_payload.h"
 #include "codec/format/sequence.h"
 #include "codec/moving_sequences.h"
@@ -127,6 +128,49 @@ TestSequence flat_sheet(std::uint32_t side, int frames) {
         out.frames.push_back({std::move(mesh), {}});
     }
     return out;
+}
+
+TEST(Limits, FramesThatShowAnothersMeshAreHeldAgainstTheBytesThatCame) {
+    auto options = test::enhanced_options();
+    options.geometry_step = 50;
+    options.topology.frame_choice = FrameChoice::motion;
+    auto packets = encode(flat_sheet(200, 2), options).packets;
+    while (!is_frame(packets.back())) packets.pop_back();  // the index
+    const auto moved = packets.back();
+    ASSERT_EQ(moved.kind, PacketKind::predicted);
+    DecoderOptions decoding;
+    decoding.max_vertices_per_byte = 1000;
+    Decoder decoder(decoding);
+    std::size_t bytes = 0;
+    for (const auto& packet : packets) bytes += packet.payload.size() + packet_overhead;
+    for (const auto& packet : packets) ASSERT_TRUE(decoder.decode_copy(packet).has_value());
+    // It is shown, and it refers to as many vertices.
+    constexpr std::size_t work = 2 * 200 * 200;
+    std::size_t decoded = 1;
+    for (;; ++decoded) {
+        bytes += moved.payload.size() + packet_overhead;
+        const auto frame = decoder.decode_copy(moved);
+        ASSERT_EQ(frame.has_value(), (decoded + 1) * work <= bytes * 1000) << decoded;
+        if (frame) continue;
+        EXPECT_EQ(frame.error().kind, ErrorKind::limit);
+        EXPECT_NE(frame.error().message.find("max_vertices_per_byte"), std::string::npos) << frame.error().message;
+        break;
+    }
+    EXPECT_GT(decoded, 5u);
+    EXPECT_LT(decoded, 100u);
+    // Whatever brings bytes of its own goes on.
+    for (const auto& packet : packets) EXPECT_EQ(decoder.decode_copy(packet).has_value(), true);
+}
+
+TEST(Limits, WhatADecoderRefusesByDefaultIsKnownBeforeItIsSent) {
+    EXPECT_TRUE(check_default_limits(FrameType::intra, {2000000, 4000000}));
+    EXPECT_TRUE(check_default_limits(FrameType::enhanced, {2000000, 4000000}));
+    const auto large = check_default_limits(FrameType::intra, {(1u << 22) + 1, 1});
+    ASSERT_FALSE(large);
+    EXPECT_NE(large.error().message.find("max_vertices"), std::string::npos) << large.error().message;
+    const auto much = check_default_limits(FrameType::enhanced, {4000000, 8000000});
+    ASSERT_FALSE(much);
+    EXPECT_NE(much.error().message.find("max_memory"), std::string::npos) << much.error().message;
 }
 
 TEST(LeastPayload, NoMeshIsCodedInLess) {

@@ -14,8 +14,9 @@ import sys
 # What both sides of the codec use.
 SHARED = ["codec/format", "codec/reference", "codec/intra", "codec/charts", "codec/tracked", "codec/bones"]
 LIVE = ["core", "codec/format"]
-INTERFACES = ["htvm/decoder.hpp", "htvm/encoder.hpp", "htvm/publisher.hpp", "htvm/picture_planes.hpp",
-              "htvm/picture_encoder.hpp", "htvm/picture_decoder.hpp", "htvm/htvm.h", "htvm/htvm.hpp"]
+INTERFACES = ["htvm/decoder.hpp", "htvm/encoder.hpp", "htvm/publisher.hpp", "htvm/watcher.hpp",
+              "htvm/picture_planes.hpp", "htvm/picture_encoder.hpp", "htvm/picture_decoder.hpp", "htvm/htvm.h",
+              "htvm/htvm_live.h", "htvm/htvm.hpp"]
 
 # A folder, or a file that stands higher than its folder; and what it includes besides its own folder and the public
 # headers of include/htvm. INTERFACES are the public headers of a floor's work: who includes one stands above that
@@ -23,6 +24,7 @@ INTERFACES = ["htvm/decoder.hpp", "htvm/encoder.hpp", "htvm/publisher.hpp", "htv
 FLOORS = [
     ("include/htvm", ["htvm/picture_planes.hpp"]),
     ("include/htvm/htvm.hpp", INTERFACES),
+    ("include/htvm/htvm_live.h", ["htvm/htvm.h"]),
     ("src/core", []),
     ("src/entropy", ["core"]),
     ("src/surface", ["core"]),
@@ -60,7 +62,9 @@ FLOORS = [
     ("src/container", ["core", "codec/format", "htvm/decoder.hpp"]),
     ("src/synth", ["core"]),
     ("src/metrics", ["core"]),
-    ("src/live/client", [*LIVE, "htvm/decoder.hpp", "htvm/publisher.hpp"]),
+    ("src/live/client", [*LIVE, "htvm/decoder.hpp", "htvm/publisher.hpp", "htvm/watcher.hpp"]),
+    ("src/c_api/c_live.cpp",
+     ["core", "c_api", "htvm/publisher.hpp", "htvm/watcher.hpp", "htvm/htvm.h", "htvm/htvm_live.h"]),
     ("src/live/hub", [*LIVE, "live/client"]),
     ("src/live/server", [*LIVE, "io", "live/client", "live/hub"]),
 ]

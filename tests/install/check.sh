@@ -31,7 +31,10 @@ for header in both/include/htvm/*.hpp; do
     c++ -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Iboth/include -x c++ -include "$header" /dev/null ||
         fail "$header does not compile by itself"
 done
-cc -std=c99 -fsyntax-only -pedantic -Wall -Wextra -Werror -Iboth/include -x c -include both/include/htvm/htvm.h /dev/null
+for header in both/include/htvm/*.h; do
+    cc -std=c99 -fsyntax-only -pedantic -Wall -Wextra -Werror -Iboth/include -x c -include "$header" /dev/null ||
+        fail "$header is not C99"
+done
 
 # The C interface's libraries export what htvm.h declares, and nothing else.
 exports() { nm -D --defined-only "$1" | awk '{ print $3 }' | LC_ALL=C sort; }
@@ -77,7 +80,7 @@ works() {
         decoder) decodes "$1" ;;
         c) encodes "$1" ;;
         c_decoder) "$project/tests/c_api/examples.sh" "${1/%_decoder/}" "$1" "$conformance" >/dev/null || fail "$1" ;;
-        draco | live) "$1" || fail "$1" ;;
+        draco | live | c_live) "$1" || fail "$1" ;;
     esac
     programs=$((programs + 1))
 }
@@ -95,7 +98,7 @@ by_cmake() {
 }
 folders=0
 plugged_in= # what needs libraries of others
-for name in draco live; do [ ! -e both/$libraries/libhtvm_$name.a ] || plugged_in+=" $name"; done
+for name in draco live c_live; do [ ! -e both/$libraries/libhtvm_$name.a ] || plugged_in+=" $name"; done
 without_eigen=-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON
 by_cmake static both "decoder" $without_eigen
 by_cmake static both "static encoder c c_decoder$plugged_in" $without_eigen
@@ -113,10 +116,11 @@ grep -q "htvm is installed without shared libraries" missing.log || { cat missin
 by_pkg_config() {
     local kind=$1 component source compiler package flags
     mkdir "pc_$kind"
-    for component in decoder encoder c c_decoder live; do
+    for component in decoder encoder c c_decoder live c_live; do
         case $component in
             c) compiler="cc -std=c99" source=$project/examples/encode.c ;;
             c_decoder) compiler="cc -std=c99" source=$project/examples/decode.c ;;
+            c_live) compiler="cc -std=c99" source=$consumer/use_c_live.c ;;
             *) compiler="c++ -std=c++20" source=$consumer/use_$component.cpp ;;
         esac
         package=htvm-${component/_/-}

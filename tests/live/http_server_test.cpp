@@ -4,7 +4,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "live/server/player_files.h"
 #include "live/server/server.h"
@@ -170,8 +173,10 @@ TEST_F(HttpServerTest, WhatIsNoRequestIsRefused) {
         boost::system::error_code error;
         net::write(socket, net::buffer(noise), error);
         socket.shutdown(tcp::socket::shutdown_send, error);
-        EXPECT_EQ(read_all(socket).find(" 200 "), std::string::npos);
+        EXPECT_EQ(status(read_all(socket)), noise.size() > 10000 ? 431 : 400);
     }
+    EXPECT_TRUE(metrics_come_to("htvm_refused_total{cause=\"request\"} 4"));
+    EXPECT_TRUE(metrics_come_to("htvm_closed_total{cause=\"http_bad_request\"} 4"));
     EXPECT_EQ(status(get("/files/person.htvm")), 200);
 }
 
@@ -180,8 +185,9 @@ TEST_F(HttpServerTest, ClientsThatDoNotFinishTheirRequestAreCutOff) {
     start();
     auto socket = connect();
     net::write(socket, net::buffer(std::string("GET /files/person.htvm HTTP/1.1\r\nHost")));
-    EXPECT_EQ(read_all(socket), "");  // returns because the server closes the connection
+    EXPECT_EQ(status(read_all(socket)), 408);  // returns because the server closes the connection
     EXPECT_EQ(status(get("/files/person.htvm")), 200);
+    EXPECT_TRUE(metrics_come_to("htvm_closed_total{cause=\"http_header_time\"} 1"));
 }
 
 TEST_F(HttpServerTest, ARequestThatComesAByteAtATimeIsCutOffAfterItsTimeCountedAndHoldsUpNobody) {
@@ -229,7 +235,7 @@ TEST_F(HttpServerTest, ConnectionsAreFew) {
         net::read(held.back(), net::buffer(answer));
         EXPECT_EQ(answer, "HTTP/1.1 200");
     }
-    EXPECT_EQ(get("/files/person.htvm"), "");
+    EXPECT_EQ(status(get("/files/person.htvm")), 503);
     held.clear();
     while (status(get("/files/person.htvm")) != 200) std::this_thread::yield();  // once the server has noticed
 }
@@ -250,6 +256,7 @@ TEST_F(HttpServerTest, ThePageForbidsWhatItDoesNotNeed) {
 TEST_F(HttpServerTest, TellsProgramsOnThisMachineWhatItCounts) {
     start();
     EXPECT_EQ(body(get("/healthz")), "ok\n");
+    EXPECT_EQ(body(get("/readyz")), "ready\n");
     const auto metrics = get("/metrics");
     EXPECT_EQ(header(metrics, "Content-Type"), "text/plain; version=0.0.4; charset=utf-8");
     EXPECT_NE(body(metrics).find("\nhtvm_connections 1\n"), std::string::npos) << metrics;
@@ -263,6 +270,67 @@ TEST_F(HttpServerTest, TellsEverybodyWhatItCountsIfAllowed) {
     options.admission.metrics_anyone = true;
     start();
     EXPECT_EQ(status(get("/metrics", "X-Forwarded-For: 192.0.2.1\r\n")), 200);
+}
+
+TEST_F(HttpServerTest, TellsHowLongAnswersTakeAndWhyConnectionsEnd) {
+    start();
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(status(get("/files/person.htvm")), 200);
+    EXPECT_TRUE(metrics_come_to("htvm_answer_seconds_count{handler=\"file\"} 3"));
+    EXPECT_TRUE(metrics_come_to("htvm_answer_seconds_bucket{handler=\"file\",le=\"+Inf\"} 3"));
+    // They asked for the connection to be closed.
+    EXPECT_NE(get("/metrics").find("\nhtvm_closed_total{cause=\"http_done\"} "), std::string::npos);
+}
+
+TEST_F(HttpServerTest, TellsOfEveryRequestWithoutWhatMayBeSecret) {
+    std::mutex mutex;
+    std::vector<Event> told;
+    options.access_log = [&](const Event& event) {
+        const std::lock_guard lock(mutex);
+        told.push_back(event);
+    };
+    start();
+    EXPECT_EQ(status(get("/files/person.htvm?signature=secret")), 200);
+    EXPECT_TRUE(soon([&] {
+        const std::lock_guard lock(mutex);
+        return told.size() == 1;
+    }));
+    const std::lock_guard lock(mutex);
+    ASSERT_EQ(told.size(), 1u);
+    EXPECT_EQ(told[0].address, "127.0.0.1");
+    EXPECT_EQ(told[0].words,
+              (std::vector<std::pair<std::string, std::string>>{{"method", "GET"}, {"path", "/files/person.htvm"}}));
+    EXPECT_EQ(told[0].numbers[0], (std::pair<std::string, std::int64_t>{"status", 200}));
+    EXPECT_EQ(told[0].numbers[1],
+              (std::pair<std::string, std::int64_t>{"bytes", static_cast<std::int64_t>(content.size())}));
+    EXPECT_EQ(told[0].text.find("secret"), std::string::npos);
+}
+
+TEST_F(HttpServerTest, WhomAKnownProxyNamesIsCountedByThatAddress) {
+    options.trusted_proxies = {"127.0.0.0/8"};
+    options.proxy_protocol = true;
+    options.admission.connections_per_address = 1;
+    start();
+    const auto through = [&](const std::string& header) {
+        auto socket = connect();
+        net::write(socket, net::buffer(header + "GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n"));
+        return socket;
+    };
+    const auto first_line = [](tcp::socket& socket) {
+        std::string answer(12, ' ');
+        boost::system::error_code error;
+        net::read(socket, net::buffer(answer), error);
+        return error ? "" : answer;
+    };
+    auto anna = through("PROXY TCP4 192.0.2.1 192.0.2.9 4711 80\r\n");
+    EXPECT_EQ(first_line(anna), "HTTP/1.1 403") << "she is no program on this machine";
+    auto again = through("PROXY TCP4 192.0.2.1 192.0.2.9 4712 80\r\n");
+    EXPECT_EQ(first_line(again), "") << "she has one connection already";
+    auto ben = through("PROXY TCP4 192.0.2.2 192.0.2.9 4713 80\r\n");
+    EXPECT_EQ(first_line(ben), "HTTP/1.1 403");
+    auto check = through(std::string("\r\n\r\n\0\r\nQUIT\n\x20\0\0\0", 16));
+    EXPECT_EQ(first_line(check), "HTTP/1.1 200") << "the proxy itself asks";
+    auto none = through("");
+    EXPECT_EQ(first_line(none), "") << "a proxy must say for whom it is";
 }
 
 TEST_F(HttpServerTest, AFolderThatIsNotThereIsAnError) {

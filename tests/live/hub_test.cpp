@@ -430,12 +430,17 @@ TEST_F(HubTest, WhoTakesTooLongForAMessageIsCutOff) {
     EXPECT_EQ(closing(slow), "");
     EXPECT_EQ(closing(watching), "");
     hub.tick(start + 5s);
-    EXPECT_EQ(closing(slow), "dead");
-    EXPECT_EQ(closing(watching), "dead");
+    EXPECT_EQ(closing(slow), "1013 a message has not come whole within 5 seconds");
+    EXPECT_EQ(closing(watching), "1013 a message has not come whole within 5 seconds");
     EXPECT_EQ(closing(quick), "");
     EXPECT_FALSE(hub.stream("anna", start + 5s)->published);
     EXPECT_EQ(hub.counters().slow_publishers, 1u);
     EXPECT_EQ(hub.counters().slow_viewers, 1u);
+    hub.leave(slow, false, start + 5s);
+    hub.leave(watching);
+    hub.leave(quick, false, start + 5s);
+    EXPECT_EQ(hub.counters().closed, (std::map<std::string, std::uint64_t>{
+                                         {"publisher_left", 1}, {"publisher_try_later", 1}, {"viewer_try_later", 1}}));
 }
 
 TEST_F(HubTest, TheLogSaysWhoPublishedLeftAndWasRefused) {
@@ -562,6 +567,18 @@ TEST_F(HubTest, ThePublishersClockGoesOnByTheHubsOwn) {
     EXPECT_EQ(clock(start + 5500ms), std::nullopt);
 }
 
+TEST_F(HubTest, WhoTakesLeaveMakesPlaceForAnotherSessionAtOnceAndWhoIsLostDoesNot) {
+    const auto first = publisher();
+    ASSERT_TRUE(hub.receive_packet(first, header(1), start));
+    hub.lets_go(first);
+    hub.leave(first, false, start);
+    const auto second = publisher();
+    EXPECT_TRUE(hub.receive_packet(second, header(2), start));
+    hub.leave(second, false, start);
+    const auto third = publisher();
+    EXPECT_FALSE(hub.receive_packet(third, header(3), start));
+}
+
 TEST_F(HubTest, ASilentPublishersConnectionEndsButNotOneThatHasNoFrames) {
     hub = Hub();
     const auto silent = publishing(), without_frames = publisher("ben"), nothing = publisher("carl");
@@ -571,8 +588,8 @@ TEST_F(HubTest, ASilentPublishersConnectionEndsButNotOneThatHasNoFrames) {
     ASSERT_TRUE(hub.receive_text(without_frames, R"({"type":"heartbeat"})", start + 2900ms));
     EXPECT_EQ(closing(silent), "");
     hub.tick(start + 3s);
-    EXPECT_EQ(closing(silent), "dead");
-    EXPECT_EQ(closing(nothing), "dead");
+    EXPECT_EQ(closing(silent), "1013 nothing was heard of the publisher");
+    EXPECT_EQ(closing(nothing), "1013 nothing was heard of the publisher");
     EXPECT_EQ(closing(without_frames), "");
     EXPECT_FALSE(info().published);
     EXPECT_EQ(some<Gone>(watching).at(0).reason, "the publisher has fallen silent");

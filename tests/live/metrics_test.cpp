@@ -22,6 +22,7 @@ std::map<std::string, double> read_metrics(const std::string& text) {
     std::map<std::string, double> out;
     std::set<std::string> types, helps;
     std::string current;
+    bool histogram = false;
     std::istringstream lines(text);
     EXPECT_TRUE(text.ends_with('\n'));
     for (std::string line; std::getline(lines, line);) {
@@ -34,8 +35,10 @@ std::map<std::string, double> read_metrics(const std::string& text) {
                 EXPECT_TRUE(helps.insert(name).second) << line;
             } else {
                 EXPECT_EQ(keyword, "TYPE") << line;
-                EXPECT_TRUE(rest == "counter" || rest == "gauge") << line;
+                histogram = rest == "histogram";
+                EXPECT_TRUE(rest == "counter" || rest == "gauge" || histogram) << line;
                 EXPECT_EQ(rest == "counter", name.ends_with("_total")) << line;
+                EXPECT_EQ(histogram, name.ends_with("_seconds") && rest != "gauge") << line;
                 EXPECT_TRUE(types.insert(name).second) << line;
                 current = name;
             }
@@ -43,15 +46,20 @@ std::map<std::string, double> read_metrics(const std::string& text) {
         }
         auto end = line.find_first_of("{ ");
         name = line.substr(0, end);
-        EXPECT_EQ(name, current) << line;
+        if (histogram)
+            EXPECT_TRUE(name == current + "_bucket" || name == current + "_sum" || name == current + "_count") << line;
+        else
+            EXPECT_EQ(name, current) << line;
         EXPECT_EQ(name.find_first_not_of("abcdefghijklmnopqrstuvwxyz_"), std::string::npos) << line;
         if (line[end] == '{') {
-            const auto quote = line.find("=\"", end);
-            bool escaped = false;
-            for (end = quote + 2; end < line.size() && (escaped || line[end] != '"'); ++end) {
-                escaped = !escaped && line[end] == '\\';
-                EXPECT_TRUE(line[end] >= 0x20 && line[end] < 0x7f) << line;
-            }
+            do {
+                const auto quote = line.find("=\"", end);
+                bool escaped = false;
+                for (end = quote + 2; end < line.size() && (escaped || line[end] != '"'); ++end) {
+                    escaped = !escaped && line[end] == '\\';
+                    EXPECT_TRUE(line[end] >= 0x20 && line[end] < 0x7f) << line;
+                }
+            } while (line.substr(end, 2) == "\",");
             EXPECT_EQ(line.substr(end, 3), "\"} ") << line;
             end += 2;
         }
@@ -89,6 +97,11 @@ TEST(MetricsTest, AHubIsToldInFull) {
     const std::map<std::string, double> expected = {
         {"htvm_uptime_seconds", 2.5},
         {"htvm_connections", 3},
+        {"htvm_ready", 1},
+        {"htvm_packet_seconds_bucket{le=\"5e-04\"}", 1},
+        {"htvm_packet_seconds_bucket{le=\"+Inf\"}", 1},
+        {"htvm_packet_seconds_count", 1},
+        {"htvm_packet_seconds_sum", 0},
         {"htvm_refused_total{cause=\"token\"}", 7},
         {"htvm_refused_total{cause=\"viewer_no_stream\"}", 1},
         {"htvm_refused_total{cause=\"publisher_stream_busy\"}", 0},
@@ -118,6 +131,21 @@ TEST(MetricsTest, AHubIsToldInFull) {
         EXPECT_EQ(metrics.at(name), value) << name;
     }
     EXPECT_FALSE(metrics.contains("htvm_recording_files_total"));
+}
+
+TEST(MetricsTest, TimesAndEndsAreTold) {
+    Traffic traffic;
+    traffic.closed["idle"] = 2;
+    for (const auto time : {400us, 20000us, 20000us, 60000us}) traffic.answer_time["file"].add(time);
+    const auto metrics = read_metrics(metrics_text({.traffic = &traffic, .ready = false, .started = start}, start));
+    EXPECT_EQ(metrics.at("htvm_ready"), 0);
+    EXPECT_EQ(metrics.at("htvm_closed_total{cause=\"http_idle\"}"), 2);
+    EXPECT_EQ(metrics.at("htvm_answer_seconds_bucket{handler=\"file\",le=\"5e-04\"}"), 1);
+    EXPECT_EQ(metrics.at("htvm_answer_seconds_bucket{handler=\"file\",le=\"0.01\"}"), 1);
+    EXPECT_EQ(metrics.at("htvm_answer_seconds_bucket{handler=\"file\",le=\"0.025\"}"), 3);
+    EXPECT_EQ(metrics.at("htvm_answer_seconds_bucket{handler=\"file\",le=\"0.1\"}"), 4);
+    EXPECT_EQ(metrics.at("htvm_answer_seconds_count{handler=\"file\"}"), 4);
+    EXPECT_DOUBLE_EQ(metrics.at("htvm_answer_seconds_sum{handler=\"file\"}"), 0.1004);
 }
 
 TEST(MetricsTest, RecordingsAreToldWhereThereAreSome) {

@@ -17,8 +17,8 @@
 #include <optional>
 #include <thread>
 
+#include "htvm/watcher.hpp"
 #include "live/client/control.h"
-#include "live/client/watcher.h"
 #include "live/server/server.h"
 #include "live_packets.h"
 #include "soon.h"
@@ -146,6 +146,19 @@ TEST(Publisher, WhatIsPublishedIsWatchedByteByByte) {
     EXPECT_TRUE(publisher.finish());
     EXPECT_EQ(publisher.state().sent_packets, sent.size());
     EXPECT_EQ(publisher.state().dropped_frames, 0u);
+}
+
+TEST(Watcher, WaitsNoLongerThanItIsToldAndEndsWhereItIsStopped) {
+    const TestHub hub;
+    auto watcher = Watcher::open(hub.url("/watch/anna")).value();
+    const auto none = watcher.next(milliseconds(20));
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().kind, ErrorKind::limit);
+    auto waiting = std::async(std::launch::async, [&] { return watcher.next(); });
+    watcher.stop();
+    const auto ended = waiting.get();
+    ASSERT_TRUE(ended) << ended.error().message;
+    EXPECT_FALSE(*ended);
 }
 
 TEST(Publisher, AHubThatIsKilledAndBackIsSentWhatTheNewestFrameNeeds) {

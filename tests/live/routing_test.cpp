@@ -31,6 +31,7 @@ TEST(Routing, EachPathHasItsHandler) {
     EXPECT_EQ(handler(request("/api/files")), Handler::file_list);
     EXPECT_EQ(handler(request("/api/streams")), Handler::stream_list);
     EXPECT_EQ(handler(request("/healthz")), Handler::health);
+    EXPECT_EQ(handler(request("/readyz")), Handler::readiness);
     EXPECT_EQ(handler(request("/metrics")), Handler::metrics);
     EXPECT_EQ(handler(request("/metrics", http::verb::head)), Handler::metrics);
     for (const char* path : {"/files", "/player", "/api", "/api/others", "/healthz/a", "/player/a/b", "/play", "/a"})

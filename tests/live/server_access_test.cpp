@@ -1,9 +1,11 @@
 // Who is let in by the server: tokens, links, origins, TLS, and its end. On this machine's loopback address.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <boost/asio/ssl.hpp>
@@ -261,6 +263,67 @@ TEST_F(ServerAccessTest, ItEndsWhenItIsToldToAndSaysSo) {
     EXPECT_EQ(read_all(idle), "");
     thread.join();
     EXPECT_LT(std::chrono::steady_clock::now() - begin, seconds(3));
+}
+
+TEST_F(ServerAccessTest, WhileItEndsItIsWellButNotReadyAndCarriesNoStream) {
+    options.drain_time = seconds(60);
+    start();
+    // Somebody is being sent a file that he does not take, so that the server cannot end at once.
+    std::ofstream(root / "served" / "large.htvm") << std::string(64 << 20, 'x');
+    auto slow = connect();
+    net::write(slow, net::buffer(std::string("GET /files/large.htvm HTTP/1.1\r\nHost: x\r\n\r\n")));
+    EXPECT_EQ(status(get("/readyz")), 200);
+    std::raise(SIGTERM);
+    EXPECT_TRUE(soon([&] { return status(get("/readyz")) == 503; }));
+    EXPECT_EQ(status(get("/healthz")), 200);
+    auto late = open("/publish/anna");
+    EXPECT_EQ(late.closing_code(), 1001u);
+    std::raise(SIGTERM);
+    thread.join();
+}
+
+TEST_F(ServerAccessTest, AServerThatSharesItsPortIsTakenOverFrom) {
+    options.share_port = true;
+    start();
+    Hub next_hub;
+    auto next_options = options;
+    next_options.hub = &next_hub;
+    next_options.port = server->port();
+    auto next = Server::open(next_options);
+    ASSERT_TRUE(next) << next.error().message;
+    std::raise(SIGTERM);
+    thread.join();
+    std::thread running([&] { next->run(); });
+    EXPECT_EQ(status(get("/readyz")), 200);
+    next->stop();
+    running.join();
+}
+
+TEST_F(ServerAccessTest, ASocketThatWasHandedOverIsListenedTo) {
+    tcp::acceptor given(context, {net::ip::make_address("127.0.0.1"), 0});
+    options.listening_socket = ::dup(given.native_handle());
+    start();
+    EXPECT_EQ(server->port(), given.local_endpoint().port());
+    EXPECT_EQ(status(get("/readyz")), 200);
+    options.listening_socket = ::open("/dev/null", O_RDONLY);
+    EXPECT_FALSE(Server::open(options));
+    ::close(options.listening_socket);
+}
+
+TEST_F(ServerAccessTest, ViewersAreCountedByTheAddressThatAKnownProxyNames) {
+    options.trusted_proxies = {"127.0.0.1"};
+    options.admission.viewers_per_address = 1;
+    start();
+    auto publisher = open("/publish/anna");
+    ASSERT_EQ(publisher.status, 101u);
+    begin(publisher);
+    wait_for_stream("anna");
+    auto one = open("/watch/anna", "X-Forwarded-For", "198.51.100.7, 192.0.2.1");
+    EXPECT_TRUE(one.next());
+    auto another = open("/watch/anna", "X-Forwarded-For", "192.0.2.2");
+    EXPECT_TRUE(another.next());
+    auto again = open("/watch/anna", "X-Forwarded-For", "192.0.2.2, 192.0.2.1");
+    EXPECT_EQ(again.closing_code(), 1013u);
 }
 
 TEST_F(ServerAccessTest, TlsIsAgreedOnAndItsCertificateReadAgain) {

@@ -266,6 +266,21 @@ std::uint64_t kept_memory(const DecoderState& state, const Packet& packet, const
     return kept;
 }
 
+// What decoding a packet that refers to something takes (work_of_frames()).
+std::uint64_t work_of(const DecoderState& state, const Packet& packet, const FrameRules& rules) {
+    if (rules.refers_to == RefersTo::nothing || !state.reference) return 0;
+    const auto& detail = state.reference->detail;
+    const auto held = counts(state.reference->mesh());
+    const auto levels = std::min<std::size_t>(state.options.detail_levels, detail.levels.size());
+    const auto shown =
+        levels == 0 ? held : MeshCounts{held.vertices + detail.vertices(), detail.triangles(levels).size()};
+    const bool grouped = packet.kind == PacketKind::tracked && state.header->version >= grouped_version;
+    const auto place = grouped ? read_group_place(packet.payload) : Result<GroupPlace>();
+    // One is shown, even if an earlier packet brought it.
+    const auto frames = grouped && place ? std::max<std::size_t>(1, brought_by(place->frame, place->length).size()) : 1;
+    return work_of_frames(held, shown, rules.reference_work, frames);
+}
+
 // The payload of a frame, once its header shows that this decoder may decode it.
 Result<FramePayloadView> read_frame(DecoderState& state, const Packet& packet, const FrameRules& rules) {
     if (!state.header) return fail(ErrorKind::corrupt_stream, "a frame came before any sequence header");
@@ -284,6 +299,8 @@ Result<FramePayloadView> read_frame(DecoderState& state, const Packet& packet, c
     const auto reference = refers ? counts(state.reference->mesh()) : MeshCounts{};
     const auto kept = kept_memory(state, packet, rules, coded);
     if (auto ok = check_limits(rules.memory, coded, reference, kept, state.options); !ok)
+        return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
+    if (auto ok = allow_work(state.received, work_of(state, packet, rules), state.options); !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
     state.spare_memory = state.options.max_memory - kept - memory_of_frame(rules.memory, coded, reference);
     if (rules.refers_to == RefersTo::reference)
@@ -329,6 +346,7 @@ void free_lent(ShownFrame& shown) {
 Result<std::optional<FrameView>> decode_packet(DecoderState& state, const Packet& packet) {
     using Decoded = std::optional<FrameView>;
     free_lent(state.shown);
+    state.received.bytes += packet.payload.size() + packet_overhead;
     if (auto ok = check_limits(packet, state.options); !ok) return tl::unexpected(ok.error());
     if (const auto type = frame_type(packet.kind)) {
         const auto& rules = rules_of(*type);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "codec/bones/codebook.h"
+#include "codec/format/decoder_limits.h"
 #include "codec/format/sequence.h"
 #include "codec/reference/reference.h"
 #include "codec/tracked/frame_group.h"
@@ -120,6 +121,7 @@ struct DecoderState {
     DecodedBones bones;
     DecodedNodes nodes;
     std::optional<UnreferredIntra> unreferred;  // where that is the newest frame
+    ReceivedWork received;
     std::uint64_t spare_memory = 0;  // bytes that detail of the frame being decoded may take, beside what is counted
     ShownFrame shown;
 };

@@ -1,5 +1,6 @@
 #include "codec/format/decoder_limits.h"
 
+#include <algorithm>
 #include <string>
 
 namespace htvm::internal {
@@ -31,6 +32,11 @@ std::uint64_t memory_of_frame(const MemoryBound& bound, MeshCounts coded, MeshCo
            each(reference, bound.reference_vertex, bound.reference_triangle);
 }
 
+std::uint64_t work_of_frames(MeshCounts reference, MeshCounts shown, std::uint64_t weight, std::uint64_t frames) {
+    const auto size = [](MeshCounts mesh) { return std::max(mesh.vertices, mesh.triangles / 2); };
+    return frames * (size(shown) + weight * size(reference));
+}
+
 Result<void> check_limits(const Packet& packet, const DecoderOptions& options) {
     if (packet.payload.size() <= options.max_packet_bytes) return {};
     return fail(ErrorKind::limit, "a packet of frame " + std::to_string(packet.frame) + " has " +
@@ -58,6 +64,17 @@ Result<void> check_limits(const MemoryBound& bound, MeshCounts coded, MeshCounts
     return fail(ErrorKind::limit, "the frame has " + std::to_string(coded.vertices) + " vertices and " +
                                       std::to_string(coded.triangles) + " triangles and may need " + megabytes(needed) +
                                       ", more than this decoder may take; raise its max_memory");
+}
+
+Result<void> allow_work(ReceivedWork& received, std::uint64_t work, const DecoderOptions& options) {
+    // Neither bytes nor work come near 2^64, but their product might.
+    const auto allowed = static_cast<double>(received.bytes) * static_cast<double>(options.max_vertices_per_byte);
+    if (static_cast<double>(received.work + work) > allowed)
+        return fail(ErrorKind::limit, "it asks for more work than the " + std::to_string(received.bytes) +
+                                          " bytes of the stream so far may; raise this decoder's "
+                                          "max_vertices_per_byte");
+    received.work += work;
+    return {};
 }
 
 }  // namespace htvm::internal

@@ -28,11 +28,22 @@ struct MemoryBound {
 };
 std::uint64_t memory_of_frame(const MemoryBound& bound, MeshCounts coded, MeshCounts reference);
 
+// What decoding the frames of a packet takes that refer to a mesh, counted in vertices shown: about as much time each,
+// whatever the kind. shown: with the detail that the mesh is shown with. weight: FrameRules::reference_work.
+std::uint64_t work_of_frames(MeshCounts reference, MeshCounts shown, std::uint64_t weight, std::uint64_t frames);
+
+// All that came of a stream, and the work that its frames asked for.
+struct ReceivedWork {
+    std::uint64_t bytes = 0, work = 0;
+};
+
 // Each an error of kind limit that says which option is too low for what.
 Result<void> check_limits(const Packet& packet, const DecoderOptions& options);
 Result<void> check_limits(const SequenceHeader& header, const DecoderOptions& options);
 // A frame's. reference: empty where it refers to nothing. kept: bytes that the decoder holds besides.
 Result<void> check_limits(const MemoryBound& bound, MeshCounts coded, MeshCounts reference, std::uint64_t kept,
                           const DecoderOptions& options);
+// Counts the work of the frames of a packet, unless that is more than what has been received allows.
+Result<void> allow_work(ReceivedWork& received, std::uint64_t work, const DecoderOptions& options);
 
 }  // namespace htvm::internal

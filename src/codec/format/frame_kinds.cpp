@@ -18,6 +18,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .renews = true,
      .codes_mesh = true,
      .memory = {384, 368, 0, 0},
+     .reference_work = 0,
      .rate = RateClass::intra},
     {.type = FrameType::enhanced,
      .packet = PacketKind::enhanced,
@@ -27,6 +28,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .referred = false,
      .codes_mesh = true,
      .memory = {384, 320, 256, 96},
+     .reference_work = 4,
      .rate = RateClass::between},
     {.type = FrameType::predicted,
      .packet = PacketKind::predicted,
@@ -36,6 +38,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .referred = false,
      .codes_mesh = false,
      .memory = {0, 0, 224, 32},
+     .reference_work = 1,
      .rate = RateClass::moved},
     {.type = FrameType::tracked,
      .packet = PacketKind::tracked,
@@ -46,6 +49,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .referred = true,
      .codes_mesh = false,
      .memory = {0, 0, 384, 192},
+     .reference_work = 4,
      .rate = RateClass::between},
     {.type = FrameType::patched,
      .packet = PacketKind::patched,
@@ -56,6 +60,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .renews = true,
      .codes_mesh = true,
      .memory = {384, 368, 768, 384},
+     .reference_work = 16,
      .rate = RateClass::between},
 }};
 
@@ -73,6 +78,13 @@ constexpr bool in_order() {
 static_assert(in_order());
 
 }  // namespace
+
+Result<void> check_default_limits(FrameType type, MeshCounts shown) {
+    const auto& rules = rules_of(type);
+    const auto reference = stands_alone(type) ? MeshCounts{} : shown;
+    return check_limits(rules.memory, shown, reference, memory_of_reference(reference), DecoderOptions{});
+}
+
 }  // namespace internal
 
 std::optional<FrameType> frame_type(PacketKind kind) {

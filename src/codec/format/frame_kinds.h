@@ -52,6 +52,7 @@ struct FrameRules {
                           // least least_payload() bytes; false: it has the counts of its reference, and its header
                           // must say so
     MemoryBound memory;   // for decoding it
+    std::uint8_t reference_work;  // likewise time: for each vertex of what it refers to, beside showing one
     RateClass rate;
 };
 
@@ -66,5 +67,9 @@ inline bool stands_alone(FrameType type) { return rules_of(type).refers_to == Re
 inline bool is_referred(const PacketHeader& packet, const FrameRules& rules) {
     return rules.referred && (!packet.has(packet_flag::flags_valid) || packet.has(packet_flag::referred));
 }
+
+// Whether a decoder at its defaults accepts a stream whose frames, of this kind, are as large: an error of kind limit
+// that says why not.
+Result<void> check_default_limits(FrameType type, MeshCounts shown);
 
 }  // namespace htvm::internal

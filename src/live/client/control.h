@@ -33,6 +33,27 @@ enum class CloseCode : std::uint16_t {
     taken_over = 4001,  // another session took the stream over
 };
 
+// A word, to count by.
+constexpr const char* name_of(CloseCode code) {
+    switch (code) {
+        case CloseCode::ended:
+            return "ended";
+        case CloseCode::shut_down:
+            return "shut_down";
+        case CloseCode::refused:
+            return "refused";
+        case CloseCode::too_large:
+            return "too_large";
+        case CloseCode::try_later:
+            return "try_later";
+        case CloseCode::continued:
+            return "continued";
+        case CloseCode::taken_over:
+            return "taken_over";
+    }
+    return "other";
+}
+
 // Numbers are whole, and within ±2^53, so that every reader of JSON holds them exactly. Times are microseconds;
 // a clock tells stream time: what the timestamps of frames count.
 

@@ -1,5 +1,6 @@
-#include "live/client/watcher.h"
+#include "htvm/watcher.hpp"
 
+#include <algorithm>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -10,7 +11,10 @@
 #include "live/client/hub_client.h"
 #include "live/client/repeated_packets.h"
 
-namespace htvm::live {
+namespace htvm {
+
+using namespace live;
+
 namespace {
 
 // Packets that may wait for the owner. What comes beyond stays in the line, so that the hub notices.
@@ -35,6 +39,7 @@ struct Watcher::State {
     std::deque<Packet> waiting;
     std::size_t waiting_bytes = 0;
     std::string trouble;  // not told yet
+    bool stopped = false;
     std::optional<HubEnding> ending;
     WatcherState counters;
     RepeatedPackets repeated;         // of the thread
@@ -113,17 +118,24 @@ Result<Watcher> Watcher::open(const std::string& url, const WatcherOptions& opti
     return Watcher(std::move(state));
 }
 
-Result<std::optional<Packet>> Watcher::next() {
+Result<std::optional<Packet>> Watcher::next() { return next(std::chrono::milliseconds::max()); }
+
+Result<std::optional<Packet>> Watcher::next(std::chrono::milliseconds timeout) {
     auto& state = *state_;
+    const auto begin = std::chrono::steady_clock::now();
     std::unique_lock lock(state.mutex);
-    while (state.waiting.empty()) {
+    while (state.waiting.empty() || state.stopped) {
+        if (state.stopped) return std::optional<Packet>();
         if (state.options.is_stopped && state.options.is_stopped()) return std::optional<Packet>();
         if (!state.trouble.empty() && state.options.trouble)
             state.options.trouble(std::exchange(state.trouble, std::string()));
         if (state.ending && state.ending->kind == HubEnding::Kind::refused)
             return fail(ErrorKind::bad_input, state.ending->reason);
         if (state.ending) return std::optional<Packet>();
-        state.changed.wait_for(lock, look_up_after);
+        const auto passed =
+            std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now() - begin);
+        if (passed >= timeout) return fail(ErrorKind::limit, "no packet came in time");
+        state.changed.wait_for(lock, std::min(look_up_after, timeout - passed));
     }
     const bool full = state.is_full();
     auto packet = std::move(state.waiting.front());
@@ -132,6 +144,12 @@ Result<std::optional<Packet>> Watcher::next() {
     lock.unlock();
     if (full) state.client->wake();
     return std::optional(std::move(packet));
+}
+
+void Watcher::stop() {
+    const std::lock_guard lock(state_->mutex);
+    state_->stopped = true;
+    state_->changed.notify_all();
 }
 
 WatcherState Watcher::state() const {
@@ -143,4 +161,4 @@ WatcherState Watcher::state() const {
     return out;
 }
 
-}  // namespace htvm::live
+}  // namespace htvm

@@ -37,6 +37,7 @@ std::string json_line(const Event& event, std::chrono::system_clock::time_point 
     if (!event.stream.empty()) out["stream"] = event.stream;
     if (!event.address.empty()) out["address"] = event.address;
     if (event.warning) out["warning"] = true;
+    for (const auto& [name, value] : event.words) out[name] = value;
     for (const auto& [name, value] : event.numbers) out[name] = value;
     return out.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }

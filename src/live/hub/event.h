@@ -17,8 +17,9 @@ struct Event {
     std::string stream{};   // which one it concerns; "": none
     std::string address{};  // of the other side; "": none
     std::vector<std::pair<std::string, std::int64_t>>
-        numbers{};         // by name, for machines; the text has those for people
-    bool warning = false;  // the person may have to do something
+        numbers{};                                             // by name, for machines; the text has those for people
+    bool warning = false;                                      // the person may have to do something
+    std::vector<std::pair<std::string, std::string>> words{};  // likewise by name, for machines
 };
 
 // Where events go; an empty one: nowhere. Called on the server's thread, so it must not block for long.

@@ -163,6 +163,7 @@ Result<void> Hub::refuse(Connection& connection, const Error& error, CloseCode c
 
 // Another connection goes on with the stream.
 void Hub::replace_publisher(Stream& stream, std::uint32_t checksum) {
+    stream.free = false;
     if (!stream.connection) return;
     auto& before = connections_.at(*stream.connection);
     before.admitted = false;
@@ -188,7 +189,7 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
     } else {
         auto& stream = known->second;
         const bool same = stream.checksum == header.reference;
-        if (!same && now - stream.heard < limits_.silence) {
+        if (!same && !stream.free && now - stream.heard < limits_.silence) {
             ++counters_.refused_publishers_busy;
             return fail(ErrorKind::bad_input,
                         stream.connection
@@ -481,10 +482,16 @@ ForPublisher Hub::next(Publisher publisher) {
                                 counters.damaged};
 }
 
+void Hub::count_close(const char* whose, const std::optional<Closing>& closing) {
+    const auto why = !closing ? "left" : closing->code ? name_of(*closing->code) : "dead";
+    ++counters_.closed[std::string(whose) + '_' + why];
+}
+
 // The connection publishes no more; the stream waits for it to come back.
 void Hub::detach(Connection& connection, const std::string& why, Clock::time_point now) {
     if (auto* stream = published_by(connection)) {
         stream->connection.reset();
+        stream->free = connection.lets_go;
         stream->heard = now;
         stream->stamp.reset();
         tell_gone(*stream, why);
@@ -500,12 +507,18 @@ void Hub::detach(Connection& connection, const std::string& why, Clock::time_poi
     connection.admitted = false;
 }
 
+void Hub::lets_go(Publisher publisher) {
+    const auto found = connections_.find(publisher.connection);
+    if (found != connections_.end()) found->second.lets_go = true;
+}
+
 void Hub::leave(Publisher publisher, bool ended_stream, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
     if (found == connections_.end()) return;
     const bool published = found->second.admitted;
     const bool ends = ended_stream || found->second.ends_stream;
     const auto name = found->second.stream;
+    if (!found->second.far) count_close("publisher", found->second.closing);
     drop(found->second.part, *found->second.share);
     detach(found->second, "the publisher's connection ended", now);
     connections_.erase(found);
@@ -579,6 +592,8 @@ void Hub::leave(const Viewer& viewer) {
     if (!watching) return;
     auto& stream = *stream_of(viewer);
     drop(watching->part, *stream.share);
+    const bool at_end = stream.ended && stream.broadcast.waiting_bytes(viewer.viewer) == 0;
+    count_close("viewer", at_end && !watching->closing ? Closing{CloseCode::ended} : watching->closing);
     const auto& counters = stream.broadcast.counters(viewer.viewer);
     counters_.dropped_frames += counters.dropped_frames;
     counters_.fallen_behind += counters.fallen_behind;
@@ -643,7 +658,9 @@ ForViewer Hub::next(const Viewer& viewer, Clock::time_point now) {
                                  .dropped = stream.broadcast.counters(viewer.viewer).dropped_frames};
     auto packet = std::exchange(watching->behind_stamp, nullptr);
     if (!packet) {
+        const auto waited = stream.broadcast.waiting_time(viewer.viewer, now);
         packet = stream.broadcast.next(viewer.viewer);
+        if (packet) counters_.packet_time.add(waited);
         if (packet && packet->stamp && watching->options.stamps) {
             watching->behind_stamp = packet;
             watching->writing = true;
@@ -698,12 +715,11 @@ void Hub::tick(Clock::time_point now) {
     // The line is as good as dead; or somebody holds memory by sending a byte now and then.
     const auto takes_too_long = [&](auto& other, const std::string& stream) {
         if (other.part.bytes == 0 || now - other.part.since < limits_.message_time) return false;
-        other.closing = Closing{};
-        other.wake();
         const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limits_.message_time).count();
-        tell({.name = "cut_off",
-              .text = "cut off: a message has not come whole within " + std::to_string(seconds) + " seconds",
-              .stream = stream});
+        const auto why = "a message has not come whole within " + std::to_string(seconds) + " seconds";
+        other.closing = Closing{CloseCode::try_later, why, true};
+        other.wake();
+        tell({.name = "cut_off", .text = "cut off: " + why, .stream = stream});
         return true;
     };
     for (auto& [number, connection] : connections_) {
@@ -717,7 +733,7 @@ void Hub::tick(Clock::time_point now) {
         if (now - connection.heard < limits_.publisher_silence) continue;
         ++counters_.silent_publishers;
         detach(connection, "the publisher has fallen silent", now);
-        connection.closing = Closing{};
+        connection.closing = Closing{CloseCode::try_later, "nothing was heard of the publisher", true};
         connection.wake();
     }
     for (auto it = streams_.begin(); it != streams_.end();) {
@@ -735,12 +751,19 @@ void Hub::tick(Clock::time_point now) {
     memory_.forget_unused();
 }
 
+void Hub::close_publishers(CloseCode code, const std::string& reason) {
+    for (auto& [number, connection] : connections_) {
+        connection.closing = Closing{code, reason};
+        connection.wake();
+    }
+}
+
 void Hub::close_all(CloseCode code, const std::string& reason) {
+    close_publishers(code, reason);
     const auto close = [&](auto& other) {
         other.closing = Closing{code, reason};
         other.wake();
     };
-    for (auto& [number, connection] : connections_) close(connection);
     for (auto& [name, stream] : streams_)
         for (auto& [viewer, watching] : stream.watching) close(watching);
     for (auto& [number, stream] : ended_)

@@ -28,6 +28,7 @@
 #include "live/client/broadcast.h"
 #include "live/client/control.h"
 #include "live/hub/event.h"
+#include "live/hub/histogram.h"
 #include "live/hub/hub_memory.h"
 
 namespace htvm::live {
@@ -97,6 +98,8 @@ struct HubCounters {
     std::uint64_t dropped_for_memory = 0;                 // packets for which HubLimits leave no memory
     std::uint64_t gave_way = 0;                           // how often a stream did, since others needed its memory
     std::uint64_t joined = 0;                             // viewers who were let in
+    std::map<std::string, std::uint64_t> closed{};        // connections that ended, by whose they were and why
+    Histogram packet_time;                                // from a packet's arrival until it is taken for a viewer
     std::size_t memory = 0;                               // of all packets, those included that have come in part, now
 };
 
@@ -188,6 +191,8 @@ public:
     // The line is alive.
     void heard(Publisher publisher, Clock::time_point now);
     ForPublisher next(Publisher publisher);
+    // The other side took leave, rather than that the line was lost: another session need not wait for it.
+    void lets_go(Publisher publisher);
     // The connection ended. ended_stream: and so did the stream, as it does too where the publisher said so
     // (EndOfStream); its viewers are sent what waits for them, and their connections end. Otherwise it may come back.
     void leave(Publisher publisher, bool ended_stream, Clock::time_point now);
@@ -236,7 +241,8 @@ public:
     void listen(HubListener listener) { listeners_.push_back(std::move(listener)); }
     // Addresses of other hubs, for those who connect from now on.
     void name_other_hubs(std::vector<std::string> addresses) { other_hubs_ = std::move(addresses); }
-    // Ends every connection.
+    // Ends the connections of publishers, or all.
+    void close_publishers(CloseCode code, const std::string& reason);
     void close_all(CloseCode code, const std::string& reason);
 
     std::vector<StreamInfo> streams(Clock::time_point now) const;
@@ -283,6 +289,7 @@ private:
         bool wants_key_frame = false;  // once it may be asked for
         std::optional<Clock::time_point> asked_for_key_frame{};
         std::uint64_t key_frame_requests = 0;
+        bool free = false;  // its publisher has let it go, and none has come since
         bool ended = false;
         std::string gone;  // why its publisher, or the stream, is gone
         std::map<Broadcast::Viewer, Watching> watching;
@@ -297,6 +304,7 @@ private:
         bool far = false;  // to another hub
         bool admitted = false;
         bool ends_stream = false;                                 // as the publisher said
+        bool lets_go = false;                                     // likewise
         bool hello = true, heartbeat = false, key_frame = false;  // to be written
         Clock::time_point heartbeat_at{};
         std::optional<Closing> closing{};
@@ -319,6 +327,7 @@ private:
     static void forget_session(Stream& stream, std::uint32_t next_checksum);
     Result<void> admit(std::uint64_t number, Connection& connection, const PacketHeader& header, Clock::time_point now);
     Result<void> refuse(Connection& connection, const Error& error, CloseCode code);
+    void count_close(const char* whose, const std::optional<Closing>& closing);
     void detach(Connection& connection, const std::string& why, Clock::time_point now);
     void begin_session(const std::string& name, Stream& stream, const PacketHeader& header,
                        std::span<const std::uint8_t> message);

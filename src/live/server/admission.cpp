@@ -91,10 +91,15 @@ unsigned AddressCounts::at(const net::ip::address& address) const {
     return found == counts_.end() ? 0 : found->second;
 }
 
-std::optional<AddressCounts::Place> Admission::admit_connection(const Address& address) {
-    if (connections_.total() >= options_.connections || connections_.at(address) >= options_.connections_per_address)
-        return std::nullopt;
+std::optional<AddressCounts::Place> Admission::admit_connection(const Address& address, bool of_proxy) {
+    if (connections_.total() >= options_.connections) return std::nullopt;
+    if (!of_proxy && connections_.at(address) >= options_.connections_per_address) return std::nullopt;
     return AddressCounts::Place(connections_, address);
+}
+
+std::optional<AddressCounts::Place> Admission::admit_behind_proxy(const Address& address) {
+    if (behind_proxies_.at(address) >= options_.connections_per_address) return std::nullopt;
+    return AddressCounts::Place(behind_proxies_, address);
 }
 
 bool Admission::names_loopback(std::string_view host) const {
@@ -122,16 +127,15 @@ bool Admission::origin_allowed(const Request& request) const {
 
 // Whether it comes from a program on this machine. A web page in a browser here is somebody else, and so is who comes
 // through a web server here.
-bool Admission::by_program_here(const Request& request, const Address& address) const {
+bool Admission::by_program_here(const Request& request, const Client& client) const {
     const auto origin = request[http::field::origin];
     const bool page_elsewhere = !origin.empty() && !names_loopback(host_of_origin(origin));
     const bool forwarded = request.count("Forwarded") || request.count("X-Forwarded-For") || request.count("Via");
-    return counted_address(address).is_loopback() && !page_elsewhere && !forwarded;
+    return counted_address(client.address).is_loopback() && !client.by_proxy && !page_elsewhere && !forwarded;
 }
 
 // "" if nothing stands against it.
-std::string Admission::why_not_publish(const Request& request, const std::string& stream,
-                                       const Address& address) const {
+std::string Admission::why_not_publish(const Request& request, const std::string& stream, const Client& client) const {
     if (credentials_.publishers) {
         auto token = std::string(bearer_token(request[http::field::authorization]));
         if (token.empty()) token = query_value(request.target(), "token").value_or("");
@@ -140,29 +144,29 @@ std::string Admission::why_not_publish(const Request& request, const std::string
                    ? ""
                    : "this token is not that of the stream's publisher";
     }
-    if (by_program_here(request, address)) return "";
+    if (by_program_here(request, client)) return "";
     return "this hub knows no publishers: only programs on its own machine may publish";
 }
 
 std::optional<Refusal> Admission::refuse_publishing(const Request& request, const std::string& stream,
-                                                    const Address& address) const {
+                                                    const Client& client) const {
     if (!is_stream_name(stream)) return Refusal{"name", stream_name_rule, http::status::bad_request};
     if (!origin_allowed(request)) return Refusal{"origin", "pages of this site may not publish here"};
-    const auto why = why_not_publish(request, stream, address);
+    const auto why = why_not_publish(request, stream, client);
     if (why.empty()) return std::nullopt;
     if (!credentials_.publishers) return Refusal{"token", why};
     return Refusal{"token", why, http::status::unauthorized, CloseCode::refused, options_.refusal_delay};
 }
 
 tl::expected<AddressCounts::Place, Refusal> Admission::admit_viewer(const Request& request, const std::string& stream,
-                                                                    bool socket, const Address& address) {
+                                                                    bool socket, const Client& client) {
     if (socket && !origin_allowed(request))
         return tl::unexpected(Refusal{"origin", "pages of this site may not watch here"});
     if (auto refusal = refuse_path("watch/" + stream, request)) return tl::unexpected(std::move(*refusal));
-    if (viewers_.at(address) >= options_.viewers_per_address)
+    if (viewers_.at(client.address) >= options_.viewers_per_address)
         return tl::unexpected(Refusal{"address", "this address has as many viewers as it may",
                                       http::status::service_unavailable, CloseCode::try_later});
-    return AddressCounts::Place(viewers_, address);
+    return AddressCounts::Place(viewers_, client.address);
 }
 
 std::optional<Refusal> Admission::refuse_path(const std::string& path, const Request& request) const {
@@ -180,8 +184,8 @@ std::optional<Refusal> Admission::refuse_lists() const {
     return Refusal{"link_missing", "this hub tells nobody what there is: it asks for links"};
 }
 
-bool Admission::may_read_metrics(const Request& request, const Address& address) const {
-    return options_.metrics_anyone || by_program_here(request, address);
+bool Admission::may_read_metrics(const Request& request, const Client& client) const {
+    return options_.metrics_anyone || by_program_here(request, client);
 }
 
 void Admission::let_others_read(const Request& request, ResponseHeader& header) const {

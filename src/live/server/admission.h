@@ -18,6 +18,7 @@
 #include "live/server/http_request.h"
 #include "live/server/refusals.h"
 #include "live/server/response.h"
+#include "live/server/trusted_proxies.h"
 
 namespace htvm::live {
 
@@ -88,8 +89,11 @@ public:
     // The server's port, which requests may name behind the host.
     void listens_on(std::uint16_t port) { port_ = port; }
 
-    // A place for another connection from this address; none if there are too many, from it or in all.
-    std::optional<AddressCounts::Place> admit_connection(const Address& address);
+    // A place for another connection from this address; none if there are too many, from it or in all. of_proxy: it
+    // may have as many as there may be in all.
+    std::optional<AddressCounts::Place> admit_connection(const Address& address, bool of_proxy = false);
+    // Likewise for whom a proxy connects.
+    std::optional<AddressCounts::Place> admit_behind_proxy(const Address& address);
     unsigned connections() const { return connections_.total(); }
 
     // Whether the request is for this server by a name that it may be called by.
@@ -97,15 +101,15 @@ public:
 
     // Why somebody may not publish the stream, if so.
     std::optional<Refusal> refuse_publishing(const Request& request, const std::string& stream,
-                                             const Address& address) const;
+                                             const Client& client) const;
     // A place for another viewer of the stream. socket: it asks for a WebSocket.
     tl::expected<AddressCounts::Place, Refusal> admit_viewer(const Request& request, const std::string& stream,
-                                                             bool socket, const Address& address);
+                                                             bool socket, const Client& client);
     // Why the request may not read what is at this path, such as "files/anna.htvm", if so: there is need of a link.
     std::optional<Refusal> refuse_path(const std::string& path, const Request& request) const;
     // Why nobody may read what streams there are, if so.
     std::optional<Refusal> refuse_lists() const;
-    bool may_read_metrics(const Request& request, const Address& address) const;
+    bool may_read_metrics(const Request& request, const Client& client) const;
 
     // Whether pages of other sites, of all or some, may read what is here.
     bool has_other_sites() const { return options_.other_sites || !options_.origins.empty(); }
@@ -114,14 +118,14 @@ public:
 
 private:
     bool names_loopback(std::string_view host) const;
-    bool by_program_here(const Request& request, const Address& address) const;
+    bool by_program_here(const Request& request, const Client& client) const;
     bool origin_allowed(const Request& request) const;
-    std::string why_not_publish(const Request& request, const std::string& stream, const Address& address) const;
+    std::string why_not_publish(const Request& request, const std::string& stream, const Client& client) const;
 
     AdmissionOptions options_;
     Credentials credentials_;
     std::uint16_t port_ = 0;
-    AddressCounts connections_, viewers_;
+    AddressCounts connections_, behind_proxies_, viewers_;
 };
 
 }  // namespace htvm::live

@@ -22,7 +22,7 @@ namespace net = boost::asio;
 namespace http = boost::beast::http;
 
 constexpr auto awaited = net::as_tuple(net::use_awaitable);
-constexpr const char* json_type = "application/json";
+constexpr const char *json_type = "application/json", *plain_text = "text/plain; charset=utf-8";
 
 // What every response has.
 ResponseHeader common_header(const Site& site) {
@@ -79,6 +79,8 @@ std::string metrics_of(const Site& site) {
                          .recorder = site.recorder,
                          .nats = site.nats ? std::optional(site.nats->counters()) : std::nullopt,
                          .refused = site.refusals.by_cause(),
+                         .traffic = &site.traffic,
+                         .ready = !site.ending,
                          .connections = site.admission.connections(),
                          .started = site.started},
                         Hub::Clock::now());
@@ -126,9 +128,9 @@ Response answer_page(const Site& site, const std::string& name, const Request& r
     return page_response(found->second, request, std::move(header));
 }
 
-Response answer_health(const Site& site, ResponseHeader header) {
+Response answer_readiness(const Site& site, ResponseHeader header) {
     if (site.ending) header.result(http::status::service_unavailable);
-    return text_response(site.ending ? "ending\n" : "ok\n", "text/plain; charset=utf-8", std::move(header));
+    return text_response(site.ending ? "ending\n" : "ready\n", plain_text, std::move(header));
 }
 
 // Answers with a sentence and ends the connection.
@@ -139,14 +141,13 @@ net::awaitable<void> refuse(const Site& site, Line line, ResponseHeader header, 
     co_await line.close();
 }
 
-net::awaitable<void> publish(const Site& site, Line line, Request request, std::string stream,
-                             net::ip::address address) {
-    const auto refusal = site.admission.refuse_publishing(request, stream, address);
+net::awaitable<void> publish(const Site& site, Line line, Request request, std::string stream, Client client) {
+    const auto refusal = site.admission.refuse_publishing(request, stream, client);
     if (!refusal) {
         co_await publish_by_socket(std::move(line), std::move(request), std::move(stream), *site.hub);
         co_return;
     }
-    site.refusals.tell(*refusal, stream, address);
+    site.refusals.tell(*refusal, stream, client.address);
     auto header = common_header(site);
     if (refusal->status == http::status::unauthorized) header.set(http::field::www_authenticate, "Bearer");
     if (refusal->delay.count() > 0) {
@@ -156,13 +157,13 @@ net::awaitable<void> publish(const Site& site, Line line, Request request, std::
     co_await refuse(site, std::move(line), std::move(header), *refusal);
 }
 
-net::awaitable<void> watch(const Site& site, Line line, Request request, Route route, net::ip::address address) {
+net::awaitable<void> watch(const Site& site, Line line, Request request, Route route, Client client) {
     auto header = common_header(site);
     site.admission.let_others_read(request, header);
-    const auto place = site.admission.admit_viewer(request, route.name, route.socket, address);
+    const auto place = site.admission.admit_viewer(request, route.name, route.socket, client);
     if (!place) {
         const auto refusal = place.error();
-        site.refusals.tell(refusal, route.name, address);
+        site.refusals.tell(refusal, route.name, client.address);
         // A browser tells a page nothing of a WebSocket that was refused before it was opened.
         if (route.socket)
             co_await refuse_socket(std::move(line), std::move(request), refusal.code, refusal.why);
@@ -176,6 +177,11 @@ net::awaitable<void> watch(const Site& site, Line line, Request request, Route r
         co_await watch_by_body(line, std::move(header), std::move(route.name), *site.hub);
         co_await line.close();
     }
+}
+
+Response shared_response(SharedText::Text text, const char* type, ResponseHeader header) {
+    if (!text) return empty_response(http::status::service_unavailable, std::move(header));
+    return text_response(std::move(text), type, std::move(header));
 }
 
 // On a thread of its own, which leaves the processor to the server's.
@@ -198,8 +204,7 @@ SharedTexts::SharedTexts(const Site& site, const net::any_io_executor& executor)
           return net::co_spawn(walker, walk(site.files), net::use_awaitable);
       }) {}
 
-net::awaitable<Response> answer(const Site& site, const Route& route, const Request& request,
-                                const net::ip::address& address) {
+net::awaitable<Response> answer(const Site& site, const Route& route, const Request& request, const Client& client) {
     SharedText::Text text;
     auto header = common_header(site);
     if (!site.admission.host_allowed(request))
@@ -220,19 +225,21 @@ net::awaitable<Response> answer(const Site& site, const Route& route, const Requ
             if (const auto refusal = site.admission.refuse_lists())
                 co_return refusing_response(*refusal, std::move(header));
             text = co_await site.texts->files.fresh();
-            co_return text_response(std::move(text), json_type, std::move(header));
+            co_return shared_response(std::move(text), json_type, std::move(header));
         case Handler::stream_list:
             if (const auto refusal = site.admission.refuse_lists())
                 co_return refusing_response(*refusal, std::move(header));
             text = co_await site.texts->streams.fresh();
-            co_return text_response(std::move(text), json_type, std::move(header));
+            co_return shared_response(std::move(text), json_type, std::move(header));
         case Handler::health:
-            co_return answer_health(site, std::move(header));
+            co_return text_response("ok\n", plain_text, std::move(header));
+        case Handler::readiness:
+            co_return answer_readiness(site, std::move(header));
         case Handler::metrics:
-            if (!site.admission.may_read_metrics(request, address))
+            if (!site.admission.may_read_metrics(request, client))
                 co_return empty_response(http::status::forbidden, std::move(header));
             text = co_await site.texts->metrics.fresh();
-            co_return text_response(std::move(text), metrics_type, std::move(header));
+            co_return shared_response(std::move(text), metrics_type, std::move(header));
         case Handler::publish:
         case Handler::watch:  // carry() does
         case Handler::nothing:
@@ -241,11 +248,21 @@ net::awaitable<Response> answer(const Site& site, const Route& route, const Requ
     co_return empty_response(http::status::not_found, std::move(header));
 }
 
-net::awaitable<void> carry(const Site& site, Line line, Request request, Route route, net::ip::address address) {
-    if (route.handler == Handler::publish)
-        co_await publish(site, std::move(line), std::move(request), std::move(route.name), address);
-    else
-        co_await watch(site, std::move(line), std::move(request), std::move(route), address);
+net::awaitable<void> carry(const Site& site, Line line, Request request, Route route, Client client, bool has_place) {
+    const Refusal full{"address", "this address has as many connections as it may", http::status::service_unavailable,
+                       CloseCode::try_later};
+    if (!has_place) site.refusals.tell(full, route.name, client.address);
+    if (!has_place && route.socket) {
+        co_await refuse_socket(std::move(line), std::move(request), full.code, full.why);
+    } else if (!has_place) {
+        co_await refuse(site, std::move(line), common_header(site), full);
+    } else if (site.ending && route.socket) {
+        co_await refuse_socket(std::move(line), std::move(request), CloseCode::shut_down, "the hub shuts down");
+    } else if (route.handler == Handler::publish) {
+        co_await publish(site, std::move(line), std::move(request), std::move(route.name), client);
+    } else {
+        co_await watch(site, std::move(line), std::move(request), std::move(route), client);
+    }
 }
 
 }  // namespace htvm::live

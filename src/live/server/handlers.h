@@ -19,6 +19,8 @@
 #include "live/server/routing.h"
 #include "live/server/served_files.h"
 #include "live/server/shared_text.h"
+#include "live/server/traffic.h"
+#include "live/server/trusted_proxies.h"
 
 namespace htvm::live {
 
@@ -31,10 +33,15 @@ struct SharedTexts {
     SharedTexts(const Site& site, const boost::asio::any_io_executor& executor);
 };
 
-// What the handlers answer from. They change nothing of it but what is called: admission, refusals and the hub.
+// What the handlers answer from. They change nothing of it but what is called or counted: admission, refusals, traffic
+// and the hub.
 struct Site {
     Admission& admission;
     Refusals& refusals;
+    Traffic& traffic;
+    TrustedProxies proxies{};
+    bool proxy_protocol = false;  // the proxies' connections begin with a header of the PROXY protocol
+    Log access{};                 // of every request; empty: none
     ServedFiles files{};
     PlayerPages pages{};
     Hub* hub = nullptr;                  // null: there are no live streams
@@ -48,10 +55,11 @@ struct Site {
 
 // The response to a request for which there is no live stream to be carried.
 boost::asio::awaitable<Response> answer(const Site& site, const Route& route, const Request& request,
-                                        const boost::asio::ip::address& address);
+                                        const Client& client);
 
-// Publishes or watches, or says why not; then the connection has ended. route: a live one.
-boost::asio::awaitable<void> carry(const Site& site, Line line, Request request, Route route,
-                                   boost::asio::ip::address address);
+// Publishes or watches, or says why not; then the connection has ended. route: a live one. has_place: whether the
+// client may have another connection.
+boost::asio::awaitable<void> carry(const Site& site, Line line, Request request, Route route, Client client,
+                                   bool has_place);
 
 }  // namespace htvm::live

@@ -36,7 +36,8 @@ constexpr std::size_t piece_bytes = 65536;  // of a message that is being read
 struct News {
     net::steady_timer timer;  // cancelled when there is
     bool writing = false;     // until the other side has taken it
-    bool ended = false;       // the connection is of no use any more
+    bool ended = false;       // the connection is of no use any more,
+    bool in_order = false;    // since the other side took leave
     explicit News(const net::any_io_executor& executor) : timer(executor) {}
     net::awaitable<void> wait() {
         timer.expires_at(std::chrono::steady_clock::time_point::max());
@@ -79,7 +80,7 @@ template <class ReceivePart, class Receive, class ReceiveNothing>
 net::awaitable<void> read_messages(SharedConnection connection, ReceivePart receive_part, Receive receive,
                                    ReceiveNothing receive_nothing) {
     auto& socket = connection->socket;
-    constexpr int patience = 1000;
+    constexpr int patience = 100;  // each costs the hub an answer
     socket.control_callback(
         [&socket, receive_nothing, refused = 0](websocket::frame_type kind, beast::string_view) mutable {
             if (kind == websocket::frame_type::close || receive_nothing() || ++refused < patience) return;
@@ -98,6 +99,7 @@ net::awaitable<void> read_messages(SharedConnection connection, ReceivePart rece
                  !(socket.got_text() && buffer.size() > most_text_bytes));
         if (failed) {
             connection->news.ended = true;
+            connection->news.in_order = failed == websocket::error::closed;
             break;
         }
         wanted = wanted && receive(socket.got_text(),
@@ -170,7 +172,10 @@ net::awaitable<void> publish_by_socket(Line line, Request request, std::string n
         co_await close(*connection, CloseCode::try_later, publisher.error().message);
         co_return;
     }
-    const Leave leave([&hub, &publisher] { hub.leave(*publisher, false, Hub::Clock::now()); });
+    const Leave leave([&hub, &publisher, connection] {
+        if (connection->news.in_order) hub.lets_go(*publisher);
+        hub.leave(*publisher, false, Hub::Clock::now());
+    });
     const auto receive_part = [&hub, number = *publisher](std::size_t bytes) {
         return hub.receive_part(number, bytes, Hub::Clock::now()).has_value();
     };

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <charconv>
+#include <map>
 #include <vector>
 
 namespace htvm::live {
@@ -45,6 +46,23 @@ public:
             text_ += "htvm_" + name;
             if (*label) text_ += std::string("{") + label + "=\"" + label_value(sample.label) + "\"}";
             text_ += ' ' + sample.value + '\n';
+        }
+    }
+    // times: by the label's value, which may be "" where there is no label.
+    void histogram(const std::string& name, const char* help, const char* label,
+                   const std::map<std::string, Histogram>& times) {
+        if (times.empty()) return;
+        text_ += "# HELP htvm_" + name + ' ' + help + "\n# TYPE htvm_" + name + " histogram\n";
+        for (const auto& [value, time] : times) {
+            const auto own = *label ? std::string(label) + "=\"" + label_value(value) + '"' : "";
+            const auto up_to = time.up_to();
+            for (std::size_t i = 0; i < up_to.size(); ++i)
+                text_ += "htvm_" + name + "_bucket{" + own + (own.empty() ? "" : ",") + "le=\"" +
+                         (i < Histogram::bounds.size() ? number_text(Histogram::bounds[i]) : "+Inf") + "\"} " +
+                         number_text(up_to[i]) + '\n';
+            const auto labels = own.empty() ? own : '{' + own + '}';
+            text_ += "htvm_" + name + "_sum" + labels + ' ' + number_text(time.seconds()) + '\n';
+            text_ += "htvm_" + name + "_count" + labels + ' ' + number_text(up_to.back()) + '\n';
         }
     }
     template <class Number>
@@ -133,6 +151,29 @@ void add_refused(Metrics& metrics, const MetricsSources& sources) {
     metrics.add("refused_total", "counter", "Requests and connections that were refused or ended", "cause", samples);
 }
 
+void add_traffic(Metrics& metrics, const MetricsSources& sources) {
+    std::map<std::string, std::uint64_t> closed;
+    std::map<std::string, Histogram> answers, late, packets;
+    if (sources.traffic) {
+        for (const auto& [why, count] : sources.traffic->closed) closed["http_" + why] = count;
+        answers = sources.traffic->answer_time;
+        late[""] = sources.traffic->late;
+    }
+    if (sources.hub) {
+        const auto total = sources.hub->counters();
+        closed.insert(total.closed.begin(), total.closed.end());
+        packets[""] = total.packet_time;
+    }
+    std::vector<Metrics::Sample> samples;
+    for (const auto& [why, count] : closed) samples.push_back({why, number_text(count)});
+    metrics.add("closed_total", "counter", "Connections that ended, by whose they were and why", "cause", samples);
+    metrics.histogram("answer_seconds", "From a request's header to its response", "handler", answers);
+    metrics.histogram("packet_seconds", "From a packet's arrival until it is taken to be written to a viewer", "",
+                      packets);
+    if (sources.hub)
+        metrics.histogram("late_seconds", "By how much what is due ten times a second came late", "", late);
+}
+
 void add_nats(Metrics& metrics, const NatsCounters& nats) {
     const auto& hubs = nats.hubs;
     metrics.gauge("nats_connected", "Whether NATS is", std::uint64_t{hubs.connected});
@@ -167,7 +208,9 @@ std::string metrics_text(const MetricsSources& sources, Hub::Clock::time_point n
     metrics.gauge("uptime_seconds", "Since the program began",
                   seconds(std::chrono::duration_cast<std::chrono::milliseconds>(now - sources.started)));
     metrics.gauge("connections", "Open now", std::uint64_t{sources.connections});
+    metrics.gauge("ready", "0: the server is ending", std::uint64_t{sources.ready});
     add_refused(metrics, sources);
+    add_traffic(metrics, sources);
     if (sources.hub) add_hub(metrics, *sources.hub, now);
     if (sources.nats) add_nats(metrics, *sources.nats);
     if (sources.recorder) {

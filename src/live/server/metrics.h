@@ -11,6 +11,7 @@
 #include "live/hub/hub.h"
 #include "live/hub/nats_peering.h"
 #include "live/server/recorder.h"
+#include "live/server/traffic.h"
 
 namespace htvm::live {
 
@@ -22,6 +23,8 @@ struct MetricsSources {
     const Recorder* recorder = nullptr;               // null: nothing is recorded
     std::optional<NatsCounters> nats{};               // none: the hub is joined with no others
     std::map<std::string, std::uint64_t> refused{};   // requests and connections, by cause; besides the hub's own
+    const Traffic* traffic = nullptr;                 // null: not counted
+    bool ready = true;                                // false: the server is ending
     unsigned connections = 0;                         // open now
     std::chrono::steady_clock::time_point started{};  // of the program
 };

@@ -8,6 +8,36 @@ namespace htvm::live {
 namespace beast = boost::beast;
 namespace http = beast::http;
 
+const char* name_of(Handler handler) {
+    switch (handler) {
+        case Handler::page:
+            return "page";
+        case Handler::player_file:
+            return "player_file";
+        case Handler::file_list:
+            return "file_list";
+        case Handler::file:
+            return "file";
+        case Handler::stream_list:
+            return "stream_list";
+        case Handler::health:
+            return "health";
+        case Handler::readiness:
+            return "readiness";
+        case Handler::metrics:
+            return "metrics";
+        case Handler::publish:
+            return "publish";
+        case Handler::watch:
+            return "watch";
+        case Handler::wrong_method:
+        case Handler::bad_path:
+        case Handler::nothing:
+            break;
+    }
+    return "nothing";
+}
+
 Route route_of(const Request& request, bool has_hub) {
     auto path = path_segments(request.target());
     const bool get = request.method() == http::verb::get;
@@ -25,6 +55,7 @@ Route route_of(const Request& request, bool has_hub) {
     const auto first = (*path)[0];
     if (path->size() == 1) {
         if (first == "healthz") return {.handler = Handler::health};
+        if (first == "readyz") return {.handler = Handler::readiness};
         if (first == "metrics") return {.handler = Handler::metrics};
         return {};
     }

@@ -14,7 +14,8 @@
 //   /play/NAME       the page, which plays the live stream of that name
 //
 // For those who run it:
-//   /healthz         "ok", or 503 once the server is ending
+//   /healthz         "ok": the server's thread runs
+//   /readyz          "ready", or 503 once the server is ending and new connections should go elsewhere
 //   /metrics         what it counts (live/server/metrics.h)
 #pragma once
 
@@ -36,11 +37,15 @@ enum class Handler : std::uint8_t {
     file,
     stream_list,
     health,
+    readiness,
     metrics,
     // These carry a live stream over the connection, which is of no use for anything else from then on:
     publish,
     watch,
 };
+
+// A word, to count by.
+const char* name_of(Handler handler);
 
 struct Route {
     Handler handler = Handler::nothing;

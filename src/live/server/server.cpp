@@ -1,6 +1,7 @@
 #include "live/server/server.h"
 
 #include <netinet/tcp.h>
+#include <sys/socket.h>
 
 #include <array>
 #include <boost/asio/as_tuple.hpp>
@@ -54,18 +55,44 @@ Result<std::optional<net::ssl::context>> read_certificate(const ServerOptions& o
     return std::optional(std::move(context));
 }
 
+// A socket that somebody else opened and listens on.
+Result<void> take_over(tcp::acceptor& acceptor, int socket) {
+    sockaddr_storage address{};
+    socklen_t size = sizeof address;
+    int listens = 0;
+    socklen_t listens_size = sizeof listens;
+    const bool known = ::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size) == 0 &&
+                       ::getsockopt(socket, SOL_SOCKET, SO_ACCEPTCONN, &listens, &listens_size) == 0;
+    beast::error_code error = net::error::invalid_argument;
+    if (known && listens && (address.ss_family == AF_INET || address.ss_family == AF_INET6))
+        acceptor.assign(address.ss_family == AF_INET ? tcp::v4() : tcp::v6(), socket, error);
+    if (error) return fail(ErrorKind::bad_input, "the socket that was handed over listens to no TCP port");
+    return {};
+}
+
+void choose_congestion_control(tcp::acceptor& acceptor, const std::string& name) {
+    if (name.empty()) return;
+    ::setsockopt(acceptor.native_handle(), IPPROTO_TCP, TCP_CONGESTION, name.data(),
+                 static_cast<socklen_t>(name.size()));
+}
+
 Result<void> listen(tcp::acceptor& acceptor, const ServerOptions& options) {
+    if (options.listening_socket >= 0) {
+        auto taken = take_over(acceptor, options.listening_socket);
+        if (taken) choose_congestion_control(acceptor, options.congestion_control);
+        return taken;
+    }
     beast::error_code error;
     const auto address = net::ip::make_address(options.address, error);
     if (error) return fail(ErrorKind::bad_input, options.address + " is not an IP address");
     const tcp::endpoint endpoint(address, options.port);
     acceptor.open(endpoint.protocol(), error);
     if (!error) acceptor.set_option(net::socket_base::reuse_address(true), error);
+    using SharedPort = net::detail::socket_option::boolean<SOL_SOCKET, SO_REUSEPORT>;
+    if (!error && options.share_port) acceptor.set_option(SharedPort(true), error);
     if (!error) acceptor.bind(endpoint, error);
     // Connections inherit it.
-    if (const auto& name = options.congestion_control; !error && !name.empty())
-        ::setsockopt(acceptor.native_handle(), IPPROTO_TCP, TCP_CONGESTION, name.data(),
-                     static_cast<socklen_t>(name.size()));
+    if (!error) choose_congestion_control(acceptor, options.congestion_control);
     if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
     if (error)
         return fail(ErrorKind::bad_input, "cannot listen on " + options.address + " port " +
@@ -118,6 +145,7 @@ struct Server::State {
     std::optional<net::ssl::context> tls;
     Refusals refusals{options.log};
     Admission admission{options.admission};
+    Traffic traffic;
     Site site;
     HttpConnections connections{site, options.header_time};
     ViewerReport viewers;
@@ -132,6 +160,9 @@ struct Server::State {
         : options(given),
           site{.admission = admission,
                .refusals = refusals,
+               .traffic = traffic,
+               .proxy_protocol = options.proxy_protocol,
+               .access = options.access_log,
                .pages = player_pages(),
                .hub = options.hub,
                .recorder = options.recorder,
@@ -143,7 +174,10 @@ struct Server::State {
     void tell(const Event& event) const {
         if (options.log) options.log(event);
     }
+    bool shares_port() const { return options.share_port || options.listening_socket >= 0; }
     net::awaitable<void> accept();
+    void take(tcp::socket socket);
+    void take_waiting();
     net::awaitable<void> serve(Line line, net::ip::address address, AddressCounts::Place place);
     net::awaitable<void> tick_hub();
     net::awaitable<void> each_second();
@@ -165,23 +199,44 @@ Result<void> Server::State::read_access_files() {
 net::awaitable<void> Server::State::accept() {
     for (;;) {
         auto [error, socket] = co_await acceptor.async_accept(awaited);
-        if (error == net::error::operation_aborted || draining) co_return;
+        if (error == net::error::operation_aborted || !acceptor.is_open()) co_return;
         if (error) {
             // Out of file descriptors, most likely: others have to end first.
             net::steady_timer pause(context, std::chrono::milliseconds(100));
             co_await pause.async_wait(awaited);
             continue;
         }
-        beast::error_code unknown;
-        const auto address = socket.remote_endpoint(unknown).address();
-        auto place = unknown ? std::nullopt : admission.admit_connection(address);
-        if (!place) {
-            refusals.count("connections");
-            continue;
-        }
-        beast::tcp_stream tcp(std::move(socket));
-        Line line = tls ? Line(std::move(tcp), *tls) : Line(std::move(tcp));
-        net::co_spawn(context, serve(std::move(line), address, std::move(*place)), net::detached);
+        take(std::move(socket));
+    }
+}
+
+void Server::State::take(tcp::socket socket) {
+    beast::error_code unknown;
+    const auto address = socket.remote_endpoint(unknown).address();
+    auto place = unknown ? std::nullopt : admission.admit_connection(address, site.proxies.trusts(address));
+    if (!place) {
+        refusals.count("connections");
+        ++traffic.closed["connections"];
+        constexpr std::string_view full =
+            "HTTP/1.1 503 Service Unavailable\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";
+        if (tls || unknown) return;
+        socket.non_blocking(true, unknown);
+        socket.write_some(net::buffer(full), unknown);
+        socket.shutdown(tcp::socket::shutdown_send, unknown);
+        return;
+    }
+    beast::tcp_stream tcp(std::move(socket));
+    Line line = tls ? Line(std::move(tcp), *tls) : Line(std::move(tcp));
+    net::co_spawn(context, serve(std::move(line), address, std::move(*place)), net::detached);
+}
+
+// The kernel would cut off those whom it has let wait for this socket.
+void Server::State::take_waiting() {
+    beast::error_code error;
+    acceptor.non_blocking(true, error);
+    while (!error) {
+        auto socket = acceptor.accept(error);
+        if (!error) take(std::move(socket));
     }
 }
 
@@ -198,6 +253,7 @@ net::awaitable<void> Server::State::tick_hub() {
     for (;;) {
         timer.expires_after(std::chrono::milliseconds(100));
         co_await timer.async_wait(awaited);
+        traffic.late.add(std::chrono::steady_clock::now() - timer.expiry());
         options.hub->tick(Hub::Clock::now());
         if (options.recorder)
             for (const auto& event : options.recorder->new_events()) tell(event);
@@ -223,6 +279,7 @@ net::awaitable<void> Server::State::reload_on_hangup() {
     net::signal_set hangup(context, SIGHUP);
     for (;;) {
         co_await hangup.async_wait(awaited);
+        if (options.reload) options.reload();
         if (const auto read = read_access_files())
             tell({.name = "reloaded", .text = "certificate, publishers and keys were read again"});
         else
@@ -238,10 +295,18 @@ net::awaitable<void> Server::State::drain_on_signal() {
     draining = true;
     site.ending = true;
     beast::error_code ignored;
-    acceptor.close(ignored);
+    if (shares_port()) {
+        take_waiting();
+        acceptor.close(ignored);
+    }
     connections.drain();
-    if (options.hub) options.hub->close_all(CloseCode::shut_down, "the hub shuts down");
+    if (options.hub) options.hub->close_publishers(CloseCode::shut_down, "the hub shuts down");
     if (admission.connections() == 0) context.stop();
+    // Publishers first: viewers shall find them where they go.
+    net::steady_timer viewers_later(context, std::chrono::milliseconds(200));
+    viewers_later.async_wait([this](const beast::error_code& cancelled) {
+        if (!cancelled && options.hub) options.hub->close_all(CloseCode::shut_down, "the hub shuts down");
+    });
     net::steady_timer timer(context, options.drain_time);
     timer.async_wait([this](const beast::error_code& cancelled) {
         if (!cancelled) context.stop();
@@ -261,6 +326,9 @@ Result<Server> Server::open(const ServerOptions& options) {
     auto files = ServedFiles::open(options.folder, options.files);
     if (!files) return tl::unexpected(files.error());
     state->site.files = std::move(*files);
+    auto proxies = TrustedProxies::read(options.trusted_proxies);
+    if (!proxies) return tl::unexpected(proxies.error());
+    state->site.proxies = std::move(*proxies);
     if (auto listening = listen(state->acceptor, options); !listening) return tl::unexpected(listening.error());
     state->port = state->acceptor.local_endpoint().port();
     state->admission.listens_on(state->port);
@@ -289,7 +357,8 @@ void Server::run() {
     net::co_spawn(state.context, state.each_second(), net::detached);
     if (options.hub) net::co_spawn(state.context, state.tick_hub(), net::detached);
     net::co_spawn(state.context, state.drain_on_signal(), net::detached);
-    if (!options.certificate.empty() || !options.admission.publishers.empty() || !options.admission.link_keys.empty())
+    if (!options.certificate.empty() || !options.admission.publishers.empty() || !options.admission.link_keys.empty() ||
+        options.reload)
         net::co_spawn(state.context, state.reload_on_hangup(), net::detached);
     state.context.run();
 }

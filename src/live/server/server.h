@@ -19,6 +19,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,6 +37,10 @@ class Recorder;
 struct ServerOptions {
     std::string address = "127.0.0.1";  // to listen on
     std::uint16_t port = 0;             // 0: a free one
+    // Others may listen there too (SO_REUSEPORT), such as the server that shall take over.
+    bool share_port = false;
+    // A socket that listens already, as systemd hands over; then address and port are its own. -1: none.
+    int listening_socket = -1;
     // TCP's congestion control, by the kernel's name for it; the kernel's own choice if it has none of this name.
     std::string congestion_control{};
     // PEM files, for TLS; both "": without. They are read again on SIGHUP together with those of AdmissionOptions: all
@@ -49,10 +54,16 @@ struct ServerOptions {
     Recorder* recorder = nullptr;    // keeps the live streams as files; null: none. It must outlive the server
 
     AdmissionOptions admission{};
+    // Addresses and networks whose word is taken for whom a connection or request is from (live/server/
+    // trusted_proxies.h): in X-Forwarded-For, and, with proxy_protocol, in a header before everything else.
+    std::vector<std::string> trusted_proxies{};
+    bool proxy_protocol = false;
     std::chrono::seconds header_time{10};  // for a whole request header, from the end of the response before
     std::chrono::seconds stall_time{30};   // for a client to take the next 64 KB
     std::chrono::seconds drain_time{5};    // for connections to end, once the server is told to
     Log log{};                             // of what happens; run() calls it
+    Log access_log{};                      // likewise of every request that was answered; empty: none
+    std::function<void()> reload{};        // likewise on SIGHUP, before the files are read again
 };
 
 class Server {
@@ -69,9 +80,9 @@ public:
     std::uint16_t port() const;
     // TCP's congestion control for the connections that follow: what was asked for, or the kernel's own choice.
     std::string congestion_control() const;
-    // Serves until stop() is called or the process is sent SIGINT or SIGTERM. Then nobody is let in any more, viewers
-    // and publishers are told, and what others are being sent has drain_time to arrive; a second signal ends it at
-    // once.
+    // Serves until stop() is called or the process is sent SIGINT or SIGTERM. Then publishers and viewers are told, and
+    // no more let in, /readyz says so, and what others are being sent has drain_time to arrive; a second signal ends it
+    // at once. Who connects meanwhile is answered here, unless the port is shared: then by whoever takes over.
     void run();
     // Ends run() at once, from any thread; only between open() and the end of run().
     void stop();

@@ -24,8 +24,12 @@ net::awaitable<SharedText::Text> SharedText::fresh() {
         net::steady_timer pause(news_.get_executor(), next_);
         co_await pause.async_wait(awaited);
         ++begun_;
-        auto text = co_await make_();
-        text_ = std::make_shared<const std::string>(std::move(text));
+        try {
+            text_ = std::make_shared<const std::string>(co_await make_());
+        } catch (...) {
+            // Whoever waits is told; who asks later has it tried again.
+            text_.reset();
+        }
         made_ = begun_;
         making_ = false;
         next_ = std::chrono::steady_clock::now() + pause_;

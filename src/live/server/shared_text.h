@@ -23,7 +23,7 @@ public:
     // pause: from the end of one to the begin of the next.
     SharedText(boost::asio::any_io_executor executor, std::chrono::milliseconds pause, Make make);
 
-    // It must live until the text has come.
+    // Null if making it failed by an exception, such as for want of memory. It must live until the text has come.
     boost::asio::awaitable<Text> fresh();
 
 private:
