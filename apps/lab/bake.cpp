@@ -34,6 +34,7 @@ struct Options {
     int size = 0;
     double quality = 50;
     int views = 3, compare_every = 10;
+    int width = 1280, height = 1024;  // of the pictures that are compared
     bool json = false;
 };
 
@@ -43,7 +44,7 @@ struct BakedFrame {
     double share = 0;  // of the picture, that charts cover
     double seen = 0, milliseconds = 0;
     std::array<double, 3> gains{};
-    std::optional<double> unlit_db;
+    std::optional<double> unlit_db, unlit_ssim;
 };
 
 std::size_t charts_of(const Mesh& mesh) {
@@ -70,13 +71,15 @@ Result<void> write_bytes(const std::filesystem::path& path, const Result<std::ve
 }
 
 // The capture, what the stream shows, and their difference, without shading, from `views` sides.
-Result<double> compare_pictures(const Options& options, std::size_t frame, UpAxis up, const TexturedMesh& captured,
-                                const TexturedMesh& shown) {
+Result<PictureErrorSums> compare_pictures(const Options& options, std::size_t frame, UpAxis up,
+                                          const TexturedMesh& captured, const TexturedMesh& shown) {
     CompareOptions compared;
     compared.points = compared.surface = compared.regions = compared.texcoords = compared.cloud = compared.topology =
         false;
     compared.views.up = up;
     compared.views.views = options.views;
+    compared.views.width = options.width;
+    compared.views.height = options.height;
     const auto result = compare_frame({captured.mesh, captured}, {shown.mesh, shown}, compared);
     if (!result) return tl::unexpected(result.error());
     if (!options.output.empty()) {
@@ -98,7 +101,7 @@ Result<double> compare_pictures(const Options& options, std::size_t frame, UpAxi
         const auto name = fmt::format("{}/view_{:05}.png", options.output, frame);
         if (auto ok = write_png(side_by_side(pictures), name); !ok) return tl::unexpected(ok.error());
     }
-    return psnr_foreground(result->unlit_pictures);
+    return result->unlit_pictures;
 }
 
 nlohmann::json json_of(const BakedFrame& frame) {
@@ -113,6 +116,7 @@ nlohmann::json json_of(const BakedFrame& frame) {
                           {"gains", frame.gains},
                           {"milliseconds", frame.milliseconds}};
     if (frame.unlit_db) out["unlit_db"] = *frame.unlit_db;
+    if (frame.unlit_ssim) out["unlit_ssim"] = *frame.unlit_ssim;
     return out;
 }
 
@@ -120,7 +124,7 @@ void print(const BakedFrame& f) {
     fmt::print("{:>6} {:>3}{:>9}{:>8}{:>10}{:>8}{:>8.1f} %{:>8.2f} %{:>8.3f}{:>7.3f}{:>7.3f}{:>8.0f}", f.info.frame,
                kind_of(f.info.type).letter, f.info.bytes.total(), f.info.bytes[Layer::charts], f.info.vertices,
                f.charts, 100 * f.share, 100 * f.seen, f.gains[0], f.gains[1], f.gains[2], f.milliseconds);
-    if (f.unlit_db) fmt::print("{:>9.2f}", *f.unlit_db);
+    if (f.unlit_db) fmt::print("{:>9.2f}{:>8.4f}", *f.unlit_db, *f.unlit_ssim);
     fmt::print("\n");
 }
 
@@ -133,8 +137,8 @@ Result<void> bake(const Options& options) {
     std::optional<TextureBaker> baker;
     std::vector<BakedFrame> frames;
     if (!options.json)
-        fmt::print("{:>6} {:>3}{:>9}{:>8}{:>10}{:>8}{:>10}{:>10}{:>22}{:>8}{:>9}\n", "frame", "", "bytes", "charts",
-                   "vertices", "charts", "picture", "seen", "gains", "ms", "M3 unlit");
+        fmt::print("{:>6} {:>3}{:>9}{:>8}{:>10}{:>8}{:>10}{:>10}{:>22}{:>8}{:>9}{:>8}\n", "frame", "", "bytes",
+                   "charts", "vertices", "charts", "picture", "seen", "gains", "ms", "M3 unlit", "SSIM");
     for (std::size_t i = 0;; ++i) {
         auto mesh = capture->next();
         if (!mesh) return tl::unexpected(mesh.error());
@@ -173,9 +177,10 @@ Result<void> bake(const Options& options) {
                 static_cast<std::uint8_t>(std::clamp(std::lround(picture->rgb[at] * baked->gains[at % 3]), 0L, 255L));
         shown.texture = picture;
         if (i % static_cast<std::size_t>(options.compare_every) == 0) {
-            const auto db = compare_pictures(options, i, capture->up(), *captured, shown);
-            if (!db) return tl::unexpected(db.error());
-            frame.unlit_db = *db;
+            const auto errors = compare_pictures(options, i, capture->up(), *captured, shown);
+            if (!errors) return tl::unexpected(errors.error());
+            frame.unlit_db = psnr_foreground(*errors);
+            frame.unlit_ssim = mean_similarity(errors->similarity);
         }
         if (!options.output.empty())
             if (auto ok = write_bytes(fmt::format("{}/texture_{:05}.png", options.output, i),
@@ -208,6 +213,9 @@ void add_bake(CLI::App& app, Run& run) {
         ->type_name("PIXELS");
     command->add_option("-q,--quality", o.quality, "Of the mesh, as of htvm encode")->check(CLI::Range(0.0, 100.0));
     command->add_option("--views", o.views, "Cameras around the subject")->check(CLI::Range(1, 100));
+    command->add_option("--width", o.width, "Pixels of the pictures that are compared")->check(CLI::Range(16, 4096));
+    command->add_option("--picture-height", o.height, "Pixels of the pictures that are compared")
+        ->check(CLI::Range(16, 4096));
     command->add_option("--compare-every", o.compare_every, "Frames are compared that are so many apart")
         ->check(CLI::Range(1, 1000000));
     command->add_flag("--json", o.json, "Print as JSON");

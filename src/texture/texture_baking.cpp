@@ -12,7 +12,6 @@
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "core/raster.h"
-#include "surface/surface_index.h"
 
 namespace htvm {
 
@@ -20,7 +19,6 @@ using namespace internal;
 
 namespace {
 
-constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 constexpr float undrawn = std::numeric_limits<float>::infinity();
 constexpr int gutter_texels = 4;
 
@@ -28,31 +26,16 @@ using Texcoords = std::array<std::array<double, 2>, 3>;  // of a triangle's corn
 
 RasterPoint raster_point(const std::array<double, 2>& texels) {
     constexpr double unit = 1 << raster_bits, most = 1 << 20;
+    // What is not below zero is rounded by cutting.
     const auto rounded = [&](double c) {
-        return static_cast<std::int32_t>(std::lround(std::clamp(c * unit, -most, most)));
+        return static_cast<std::int32_t>(std::clamp(c * unit, -most, most) + most + 0.5) -
+               static_cast<std::int32_t>(most);
     };
     return {rounded(texels[0]), rounded(texels[1])};
 }
 
 double area_of(const Texcoords& p) {
     return 0.5 * ((p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]));
-}
-
-// The triangle across each edge, or none.
-std::vector<std::array<std::uint32_t, 3>> triangles_beside(std::span<const Triangle> triangles) {
-    std::vector<std::array<std::uint32_t, 3>> out(triangles.size(), {none, none, none});
-    std::unordered_map<std::uint64_t, std::uint32_t> open;
-    open.reserve(2 * triangles.size());
-    for (std::uint32_t t = 0; t < triangles.size(); ++t)
-        for (std::uint32_t i = 0; i < 3; ++i) {
-            const auto a = triangles[t][i], b = triangles[t][(i + 1) % 3];
-            const auto [at, is_new] = open.emplace(std::uint64_t{std::min(a, b)} << 32 | std::max(a, b), 3 * t + i);
-            if (is_new) continue;
-            out[t][i] = at->second / 3;
-            out[at->second / 3][at->second % 3] = t;
-            open.erase(at);
-        }
-    return out;
 }
 
 // Texels of an image between their centres, in whole numbers; coordinates in texels times 2^16 from its first centre.
@@ -104,7 +87,7 @@ TextureBaker::TextureBaker(const TextureBakingOptions& options) : options_(optio
     const auto texels = static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height);
     picture_.rgb.assign(3 * texels, 128);
     is_known_.assign(texels, 0);
-    nearness_.assign(texels, undrawn);
+    doubts_.assign(texels, undrawn);
     drawn_ = picture_;
 }
 
@@ -140,6 +123,24 @@ std::vector<std::uint32_t> charts_of(const Mesh& shown) {
 
 }  // namespace
 
+namespace {
+
+// What corresponds on this subject to a millimetre on an adult: what stands between 1.1 and 2.5 m is one.
+double adult_millimetre(const Mesh& mesh) {
+    constexpr double adult = 1750, shortest = 1100, longest = 2500;
+    Vector3f low = mesh.positions[0], high = low;
+    for (const auto& p : mesh.positions)
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            low[axis] = std::min(low[axis], p[axis]);
+            high[axis] = std::max(high[axis], p[axis]);
+        }
+    double size = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) size = std::max(size, static_cast<double>(high[axis] - low[axis]));
+    return size >= shortest && size <= longest ? 1 : size / adult;
+}
+
+}  // namespace
+
 // Draws the triangles' charts into the picture. What a triangle that stays showed remains known.
 std::vector<std::uint8_t> TextureBaker::place_charts(const Mesh& shown, Layout& next) const {
     const int width = options_.width, height = options_.height;
@@ -161,6 +162,7 @@ std::vector<std::uint8_t> TextureBaker::place_charts(const Mesh& shown, Layout& 
             at[i] = {static_cast<double>(coordinates[0]) * width, static_cast<double>(coordinates[1]) * height};
         }
         in_picture += std::abs(area_of(at));
+        next.is_mirrored.push_back(area_of(at) < 0);
         in_space += length(area_vector(std::span(shown.positions), shown.triangles[t])) / 2;
         for_each_cell({raster_point(at[0]), raster_point(at[1]), raster_point(at[2])}, {0, 0, width, height},
                       [&](std::int32_t x, std::int32_t y) {
@@ -225,58 +227,9 @@ void TextureBaker::lay_out(const Mesh& shown, std::span<const std::uint32_t> rep
             if (v >= own) v = repeated[v - own];
     next.beside = triangles_beside(next.welded);
     next.chart_of_triangle = charts_of(shown);
+    next.adult_millimetre = adult_millimetre(shown);
     is_known_ = place_charts(shown, next);
     layout_ = std::move(next);
-}
-
-// ---- Where captured vertices lie -----------------------------------------------------------------------------------
-
-std::vector<TextureBaker::Match> TextureBaker::matches(const Mesh& captured, const Mesh& shown,
-                                                       std::size_t own_vertices) const {
-    const auto positions = std::span(shown.positions).first(own_vertices);
-    const double edge = mean_edge(positions, layout_.welded, 8);
-    const SurfaceIndex surface(
-        positions, layout_.welded,
-        {.cell = static_cast<float>(std::max({2 * edge, options_.reach / 16, 1e-3})), .threads = options_.threads});
-    std::vector<Point3f> normals = captured.normals;
-    if (normals.empty())
-        for (const auto& n : vertex_normals(captured.positions, captured.triangles)) normals.push_back(to_floats(n));
-    // The search begins at the nearest vertex, which may be an edge farther away than the surface.
-    const double reach = options_.reach + 2 * edge;
-    const auto found =
-        closest_facing(surface, captured.positions, normals, {.reach = static_cast<float>(reach)}, options_.threads);
-    std::vector<Match> out(found.size());
-    parallel_for(found.size(), options_.threads, 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) {
-            if (!found[v].found()) continue;
-            // The closest point may be in a triangle without the nearest vertex.
-            const auto p = to_vector(captured.positions[v]);
-            const auto closest_in = [&](std::uint32_t t) {
-                const auto& [a, b, c] = layout_.welded[t];
-                return closest_on_triangle(p, to_vector(positions[a]), to_vector(positions[b]),
-                                           to_vector(positions[c]));
-            };
-            auto triangle = found[v].triangle;
-            auto best = closest_in(triangle);
-            constexpr int most_steps = 8;
-            for (int step = 0; step < most_steps; ++step) {
-                const auto from = triangle;
-                for (std::size_t i = 0; i < 3; ++i) {
-                    const auto beside = layout_.beside[from][i];
-                    // Across an edge only where the closest point lies on it.
-                    if (beside == none || best.shares[(i + 2) % 3] > 0) continue;
-                    const auto there = closest_in(beside);
-                    if (there.squared_distance < best.squared_distance) best = there, triangle = beside;
-                }
-                if (triangle == from) break;
-            }
-            if (best.squared_distance > options_.reach * options_.reach) continue;
-            out[v].triangle = triangle;
-            for (std::size_t i = 0; i < 3; ++i) out[v].shares[i] = static_cast<float>(best.shares[i]);
-            out[v].distance = static_cast<float>(std::sqrt(best.squared_distance));
-        }
-    });
-    return out;
 }
 
 // ---- Drawing -------------------------------------------------------------------------------------------------------
@@ -286,7 +239,7 @@ std::vector<TextureBaker::Match> TextureBaker::matches(const Mesh& captured, con
 // is, a little beyond the chart's border. Nothing where that fails, or where a corner was matched elsewhere.
 std::optional<TextureBaker::Corners> TextureBaker::corners_in_picture(const Mesh& captured, const Mesh& shown,
                                                                       const Triangle& t,
-                                                                      const std::array<const Match*, 3>& match,
+                                                                      const std::array<const SurfaceMatch*, 3>& match,
                                                                       std::size_t k) const {
     const auto place = [&](const std::array<double, 3>& shares, std::uint32_t triangle) {
         std::array<double, 2> out{};
@@ -316,28 +269,31 @@ std::optional<TextureBaker::Corners> TextureBaker::corners_in_picture(const Mesh
             at[i] = *beyond;
         }
     }
+    // The captured triangle lies as the decoded one does, unless it is of the other side, whose rim came near.
+    if ((area_of(at) < 0) != layout_.is_mirrored[match[k]->triangle]) return std::nullopt;
     // A triangle that comes out much larger than it is has a corner that was matched elsewhere.
     constexpr double stretch = 3, besides = 4;  // texels
     for (std::size_t i = 0; i < 3; ++i) {
         const std::size_t j = (i + 1) % 3;
         const double apart = length(to_vector(captured.positions[t[i]]) - to_vector(captured.positions[t[j]]));
-        if (!(std::hypot(at[i][0] - at[j][0], at[i][1] - at[j][1]) <=
-              stretch * apart * layout_.texels_per_millimetre + besides))
-            return std::nullopt;
+        const double x = at[i][0] - at[j][0], y = at[i][1] - at[j][1];
+        const double most = stretch * apart * layout_.texels_per_millimetre + besides;
+        if (!(x * x + y * y <= most * most)) return std::nullopt;
     }
     return at;
 }
 
-void TextureBaker::draw(const TexturedMesh& captured, const Mesh& shown, std::span<const Match> matches) {
+void TextureBaker::draw(const TexturedMesh& captured, const Mesh& shown, std::span<const SurfaceMatch> matches) {
     const Mesh& mesh = captured.mesh;
     const int width = options_.width, height = options_.height;
-    std::fill(nearness_.begin(), nearness_.end(), undrawn);
+    std::fill(doubts_.begin(), doubts_.end(), undrawn);
     const ImagePyramid pyramid(*captured.texture);
     std::vector<Sampler> samplers;
     for (std::size_t level = 0; level < pyramid.levels(); ++level) samplers.emplace_back(pyramid.at_level(level));
 
     // Draws a captured triangle into a chart. at: where its corners lie in the picture.
-    const auto draw_triangle = [&](const Triangle& t, const Corners& at, std::uint32_t chart, float distance) {
+    const auto draw_triangle = [&](const Triangle& t, const Corners& at, std::uint32_t chart,
+                                   const std::array<double, 3>& doubts) {
         // From places in the picture to places in the captured image.
         const double area = 2 * area_of(at);
         if (std::abs(area) < 1e-9) return;
@@ -350,22 +306,29 @@ void TextureBaker::draw(const TexturedMesh& captured, const Mesh& shown, std::sp
         const double ratio = std::sqrt(std::abs(2 * area_of(from) / area));
         const auto level = pyramid.level_for(ratio);
         const double smaller = 1.0 / static_cast<double>(std::size_t{1} << level);
-        std::array<std::array<double, 3>, 2> affine;  // per axis: by x, by y, constant
-        for (std::size_t axis = 0; axis < 2; ++axis) {
-            const double first = from[1][axis] - from[0][axis], second = from[2][axis] - from[0][axis];
+        // By x, by y, constant: what has these values at the corners, in terms of the texel. A texel's centre is half a
+        // texel from its corner.
+        const auto affine_of = [&](double a, double b, double c) -> std::array<double, 3> {
+            const double first = b - a, second = c - a;
             const double by_x = (first * (at[2][1] - at[0][1]) - second * (at[1][1] - at[0][1])) / area;
             const double by_y = (second * (at[1][0] - at[0][0]) - first * (at[2][0] - at[0][0])) / area;
-            // From texel to texel; the first texel's centre is half a texel from the corner on both sides.
-            affine[axis] = {by_x * smaller, by_y * smaller,
-                            (from[0][axis] + by_x * (0.5 - at[0][0]) + by_y * (0.5 - at[0][1])) * smaller - 0.5};
+            return {by_x, by_y, a + by_x * (0.5 - at[0][0]) + by_y * (0.5 - at[0][1])};
+        };
+        std::array<std::array<double, 3>, 2> affine;  // per axis
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+            affine[axis] = affine_of(from[0][axis], from[1][axis], from[2][axis]);
+            for (auto& factor : affine[axis]) factor *= smaller;
+            affine[axis][2] -= 0.5;
         }
+        const auto doubt_of = affine_of(doubts[0], doubts[1], doubts[2]);
         constexpr double unit = 65536;
         const auto& sampler = samplers[level];
         for_each_cell({raster_point(at[0]), raster_point(at[1]), raster_point(at[2])}, {0, 0, width, height},
                       [&](std::int32_t x, std::int32_t y) {
                           const auto texel = static_cast<std::size_t>((height - 1 - y) * width + x);
-                          if (layout_.chart_of_texel[texel] != chart || nearness_[texel] <= distance) return;
-                          nearness_[texel] = distance;
+                          const auto doubt = static_cast<float>(doubt_of[0] * x + doubt_of[1] * y + doubt_of[2]);
+                          if (layout_.chart_of_texel[texel] != chart || doubts_[texel] <= doubt) return;
+                          doubts_[texel] = doubt;
                           const auto& [u, v] = affine;
                           sampler.at(static_cast<std::int64_t>((u[0] * x + u[1] * y + u[2]) * unit),
                                      static_cast<std::int64_t>((v[0] * x + v[1] * y + v[2]) * unit),
@@ -374,14 +337,14 @@ void TextureBaker::draw(const TexturedMesh& captured, const Mesh& shown, std::sp
     };
 
     for (const auto& t : mesh.triangles) {
-        const std::array<const Match*, 3> match = {&matches[t[0]], &matches[t[1]], &matches[t[2]]};
-        if (match[0]->triangle == none || match[1]->triangle == none || match[2]->triangle == none) continue;
-        const float distance = (match[0]->distance + match[1]->distance + match[2]->distance) / 3;
+        const std::array<const SurfaceMatch*, 3> match = {&matches[t[0]], &matches[t[1]], &matches[t[2]]};
+        if (!match[0]->found() || !match[1]->found() || !match[2]->found()) continue;
+        const std::array<double, 3> doubts = {match[0]->doubt, match[1]->doubt, match[2]->doubt};
         std::array<std::uint32_t, 3> chart;
         for (std::size_t i = 0; i < 3; ++i) chart[i] = layout_.chart_of_triangle[match[i]->triangle];
         for (std::size_t k = 0; k < 3; ++k) {
             if ((k > 0 && chart[k] == chart[0]) || (k > 1 && chart[k] == chart[1])) continue;
-            if (const auto at = corners_in_picture(mesh, shown, t, match, k)) draw_triangle(t, *at, chart[k], distance);
+            if (const auto at = corners_in_picture(mesh, shown, t, match, k)) draw_triangle(t, *at, chart[k], doubts);
         }
     }
 }
@@ -399,7 +362,7 @@ std::array<double, 3> TextureBaker::exposure() const {
         std::size_t all = 0;
         for (std::size_t i = 0; i < layout_.inside.size(); i += every) {
             const auto texel = layout_.inside[i];
-            if (!is_known_[texel] || nearness_[texel] == undrawn) continue;
+            if (!is_known_[texel] || doubts_[texel] == undrawn) continue;
             const int was = picture_.rgb[3 * texel + c], is = drawn_.rgb[3 * texel + c];
             if (was < least || was > most || is < least || is > most) continue;
             // Levels are whole numbers: spread evenly over the step that each stands for.
@@ -458,8 +421,15 @@ void TextureBaker::fill_holes() {
             for (int x = 0; x < own.width; ++x) {
                 float* to = &own.sums[4 * static_cast<std::size_t>(y * own.width + x)];
                 if (to[3] > 0) continue;
-                const float* from = &above.sums[4 * static_cast<std::size_t>((y / 2) * above.width + x / 2)];
-                for (int c = 0; c < 4; ++c) to[c] = from[c];
+                // Between the centres of the four nearest above, so that what is filled is smooth, and costs no bits.
+                const int left = x / 2, row = y / 2;
+                const int beside = std::clamp(left + (x % 2 == 0 ? -1 : 1), 0, above.width - 1);
+                const int next = std::clamp(row + (y % 2 == 0 ? -1 : 1), 0, above.height - 1);
+                const auto at = [&](int u, int v) {
+                    return &above.sums[4 * static_cast<std::size_t>(v * above.width + u)];
+                };
+                const float *a = at(left, row), *b = at(beside, row), *d = at(left, next), *e = at(beside, next);
+                for (int c = 0; c < 4; ++c) to[c] = (9 * a[c] + 3 * b[c] + 3 * d[c] + e[c]) / 16;
             }
     }
     for (std::size_t i = 0; i < texels; ++i) {
@@ -485,7 +455,9 @@ Result<BakedTexture> TextureBaker::bake(const TexturedMesh& captured, const Mesh
         return bad("the decoded mesh does not have the vertices that are to be repeated");
     const bool anew = is_new(shown);
     if (anew) lay_out(shown, repeated);
-    draw(captured, shown, matches(captured.mesh, shown, own));
+    const MatchedSurface surface{std::span(shown.positions).first(own), layout_.welded, layout_.beside};
+    draw(captured, shown,
+         surface_matches(captured.mesh, surface, options_.reach * layout_.adult_millimetre, options_.threads));
 
     BakedTexture out;
     if (options_.exposure) out.gains = exposure();
@@ -500,7 +472,7 @@ Result<BakedTexture> TextureBaker::bake(const TexturedMesh& captured, const Mesh
     };
     std::size_t seen = 0;
     for (const auto texel : layout_.inside) {
-        if (nearness_[texel] == undrawn) continue;
+        if (doubts_[texel] == undrawn) continue;
         keep(texel);
         ++seen;
     }
@@ -511,7 +483,7 @@ Result<BakedTexture> TextureBaker::bake(const TexturedMesh& captured, const Mesh
         fill_holes();
     }
     for (const auto& [texel, source] : layout_.gutter) {
-        if (nearness_[texel] != undrawn) {
+        if (doubts_[texel] != undrawn) {
             keep(texel);
             continue;
         }

@@ -2,8 +2,8 @@
 // charts (EncoderOptions::texture): what a video of the texture is made of. A stream's layout lasts, so these hardly
 // change from frame to frame, whatever the capture's does.
 //
-// Each captured vertex is matched with the closest point of the decoded surface, which has a place in the picture. The
-// captured triangles are then drawn between these places, with the captured image on them.
+// Each captured vertex is matched with a point of the decoded surface (surface_matches.h), which has a place in the
+// picture. The captured triangles are then drawn between these places, with the captured image on them.
 #pragma once
 
 #include <array>
@@ -16,12 +16,14 @@
 #include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "texture/surface_matches.h"
 
 namespace htvm {
 
 struct TextureBakingOptions {
     int width = 1024, height = 1024;  // of the pictures, as the sequence header says
-    double reach = 30;                // mm: captured vertices farther from the decoded surface are left out
+    double reach = 30;                // mm on an adult, in proportion to size on other subjects: captured vertices
+                                      // farther from the decoded surface are left out
     bool exposure = true;             // whether the picture keeps the exposure of the one before: see BakedTexture
     internal::Threads threads = {};
 };
@@ -57,25 +59,19 @@ private:
         std::vector<std::uint32_t> chart_of_texel;         // of those within a chart or its gutter; else 0
         std::vector<Texel> inside;                         // the texels within charts
         std::vector<std::array<Texel, 2>> gutter;          // a texel, and the one nearest to it that is inside
+        std::vector<bool> is_mirrored;                     // of each triangle: whether it lies face down in the picture
         double texels_per_millimetre = 1;
+        double adult_millimetre = 1;  // what corresponds on this subject to a mm on an adult
     };
-    // Where captured vertices lie on the decoded surface.
-    struct Match {
-        std::uint32_t triangle = 0xFFFFFFFF;
-        std::array<float, 3> shares{};
-        float distance = 0;  // mm
-    };
-
     using Corners = std::array<std::array<double, 2>, 3>;  // of a triangle, in texels
 
     bool is_new(const Mesh& shown) const;
     void lay_out(const Mesh& shown, std::span<const std::uint32_t> repeated);
     std::vector<std::uint8_t> place_charts(const Mesh& shown, Layout& next) const;
     void add_gutters(Layout& next) const;
-    std::vector<Match> matches(const Mesh& captured, const Mesh& shown, std::size_t own_vertices) const;
     std::optional<Corners> corners_in_picture(const Mesh& captured, const Mesh& shown, const Triangle& t,
-                                              const std::array<const Match*, 3>& match, std::size_t k) const;
-    void draw(const TexturedMesh& captured, const Mesh& shown, std::span<const Match> matches);
+                                              const std::array<const SurfaceMatch*, 3>& match, std::size_t k) const;
+    void draw(const TexturedMesh& captured, const Mesh& shown, std::span<const SurfaceMatch> matches);
     std::array<double, 3> exposure() const;
     void fill_holes();
 
@@ -84,7 +80,7 @@ private:
     Image picture_;                       // the last one
     std::vector<std::uint8_t> is_known_;  // of each texel of the last one: whether it has a colour that means something
     Image drawn_;                         // this frame's, before exposure is taken out
-    std::vector<float> nearness_;         // of each texel drawn: how far what it shows is from the decoded surface
+    std::vector<float> doubts_;           // of each texel drawn: SurfaceMatch::doubt of what it shows
 };
 
 // The side of square pictures in which charts have about as many texels a millimetre as the captured image: a multiple

@@ -59,6 +59,7 @@ FLOORS = [
     ("src/sound", ["core", "io"]),
     ("src/texture", ["core", "htvm/picture_planes.hpp", "htvm/picture_encoder.hpp", "htvm/picture_decoder.hpp"]),
     ("src/texture/texture_baking.cpp", ["core", "surface"]),
+    ("src/texture/surface_matches.cpp", ["core", "surface"]),
     ("src/container", ["core", "codec/format", "htvm/decoder.hpp"]),
     ("src/synth", ["core"]),
     ("src/metrics", ["core"]),

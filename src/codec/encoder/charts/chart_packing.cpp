@@ -1,6 +1,6 @@
-// Charts are packed by what they cover, not by boxes: the picture is a grid of cells, each chart a set of cells that
-// its triangles touch and one more around them. The largest comes first, each at the lowest place where its cells are
-// free, upright or turned by a quarter.
+// Charts are packed by what they cover, not by boxes: the picture is a grid of fine cells, each chart a set of cells
+// that its triangles touch and a gutter's width of them around. The largest comes first, each at the lowest place where
+// its cells are free, upright or turned by a quarter.
 #include "codec/encoder/charts/chart_packing.h"
 
 #include <algorithm>
@@ -17,11 +17,18 @@ namespace {
 
 constexpr std::int32_t texel = 1 << texel_bits;
 // The share of the picture, its upper part, that a whole mesh's charts leave free.
-constexpr double free_share = 0.15;
+constexpr double free_share = 0.08;
+constexpr std::int32_t gutter = 4;  // texels
 
-// The side of a cell in texels: a gutter, or more where the grid would have more than 256 cells along a side.
+// The side of a cell in texels: half a gutter, or more where the grid would have more than 640 cells along a side.
 std::int32_t cell_of(const StreamTexture& picture) {
-    return std::max(4, (std::max(picture.width, picture.height) + 255) / 256);
+    return std::max(gutter / 2, (std::max(picture.width, picture.height) + 639) / 640);
+}
+// How many cells a gutter takes.
+std::int32_t ring_of(std::int32_t cell) { return (gutter + cell - 1) / cell; }
+// Places are tried so many cells apart: the time of a search grows with the square of how many there are.
+std::int32_t stride_of(const StreamTexture& picture, std::int32_t cell) {
+    return std::max(1, (std::max(picture.width, picture.height) / cell + 271) / 272);
 }
 
 // A grid of bits, 64 to a word.
@@ -55,6 +62,23 @@ public:
         }
         return true;
     }
+    // These and those around them, up to `ring` cells away along either axis.
+    Cells grown(std::int32_t ring) const {
+        Cells wide = *this, out(width_, height_);
+        for (std::int32_t y = 0; y < height_; ++y)
+            for (std::size_t i = 0; i < words_; ++i) {
+                const auto at = row(y) + i;
+                const auto before = i > 0 ? bits_[at - 1] : 0, own = bits_[at],
+                           next = i + 1 < words_ ? bits_[at + 1] : 0;
+                for (int k = 1; k <= ring; ++k)
+                    wide.bits_[at] |= own << k | own >> k | before >> (64 - k) | next << (64 - k);
+            }
+        for (std::int32_t y = 0; y < height_; ++y)
+            for (std::int32_t from = std::max(y - ring, 0); from <= std::min(y + ring, height_ - 1); ++from)
+                for (std::size_t i = 0; i < words_; ++i) out.bits_[row(y) + i] |= wide.bits_[row(from) + i];
+        out.clear_beyond();
+        return out;
+    }
     void add(const Cells& others, std::int32_t at_x, std::int32_t at_y) {
         for (std::int32_t y = 0; y < others.height_; ++y)
             for (std::int32_t x = 0; x < others.width_; ++x)
@@ -63,14 +87,20 @@ public:
     }
 
 private:
+    // A row's last word has bits for cells that are not there.
+    void clear_beyond() {
+        if (width_ % 64 == 0) return;
+        const auto kept = (std::uint64_t{1} << (width_ % 64)) - 1;
+        for (std::int32_t y = 0; y < height_; ++y) bits_[row(y) + words_ - 1] &= kept;
+    }
     std::size_t row(std::int32_t y) const { return words_ * static_cast<std::size_t>(y); }
     std::int32_t width_, height_;
     std::size_t words_;
     std::vector<std::uint64_t> bits_;
 };
 
-// Sets the cells that a triangle touches, and those around them. Corners in texels times 2^texel_bits, cells from
-// `ring` cells before the origin on.
+// Sets the cells that a triangle touches. Corners in texels times 2^texel_bits, cells from `ring` cells before the
+// origin on.
 void cover(Cells& cells, const CornerTexcoords& corners, std::int32_t cell, std::int32_t ring) {
     const double side = static_cast<double>(cell) * texel;
     std::array<std::array<double, 2>, 3> p;
@@ -105,8 +135,7 @@ void cover(Cells& cells, const CornerTexcoords& corners, std::int32_t cell, std:
                 return edge.x * x + edge.y * y < edge.farthest - 1e-9;
             });
             if (beside) continue;
-            for (std::int32_t dy = -1; dy <= 1; ++dy)
-                for (std::int32_t dx = -1; dx <= 1; ++dx) cells.set(x + ring + dx, y + ring + dy);
+            cells.set(x + ring, y + ring);
         }
 }
 
@@ -138,21 +167,26 @@ std::vector<Cells> cells_of(const ChartLayout& layout, std::span<const CornerTex
             }
     // No chart is larger than this and fits.
     constexpr std::int32_t most_cells = 1100;
+    const auto ring = ring_of(cell);
     std::vector<Cells> out;
-    for (const auto& [x, y] : largest)
-        out.emplace_back(std::min(x / (cell * texel) + 3, most_cells), std::min(y / (cell * texel) + 3, most_cells));
+    const auto side = [&](std::int32_t to) { return std::min(to / (cell * texel) + 1 + 2 * ring, most_cells); };
+    for (const auto& [x, y] : largest) out.emplace_back(side(x), side(y));
+    const auto fits = [&](const Cells& cells) { return cells.width() < most_cells && cells.height() < most_cells; };
     for (std::size_t t = 0; t < corners.size(); ++t) {
         auto& cells = out[layout.chart_of_triangle[t]];
-        if (cells.width() < most_cells && cells.height() < most_cells) cover(cells, corners[t], cell, 1);
+        if (fits(cells)) cover(cells, corners[t], cell, ring);
     }
+    for (auto& cells : out)
+        if (fits(cells)) cells = cells.grown(ring);
     return out;
 }
 
 // The lowest place where the cells are free, of those the leftmost.
-std::optional<std::array<std::int32_t, 2>> place_for(const Cells& chart, const Cells& picture, std::int32_t top) {
+std::optional<std::array<std::int32_t, 2>> place_for(const Cells& chart, const Cells& picture, std::int32_t top,
+                                                     std::int32_t stride) {
     std::int32_t last = 0;  // the row that did not fit the last time, which probably does not fit the next time
-    for (std::int32_t y = 0; y + chart.height() <= top; ++y)
-        for (std::int32_t x = 0; x + chart.width() <= picture.width(); ++x) {
+    for (std::int32_t y = 0; y + chart.height() <= top; y += stride)
+        for (std::int32_t x = 0; x + chart.width() <= picture.width(); x += stride) {
             if (!picture.row_is_free(chart, last, x, y)) continue;
             std::int32_t row = 0;
             while (row < chart.height() && picture.row_is_free(chart, row, x, y)) ++row;
@@ -162,18 +196,25 @@ std::optional<std::array<std::int32_t, 2>> place_for(const Cells& chart, const C
     return std::nullopt;
 }
 
-// Gives all charts places among the free cells below `top`; false if one finds none. upright, turned: of the same
-// charts.
-bool pack(ChartLayout& layout, const Shape& upright, const Shape& turned, Cells picture, std::int32_t top,
-          std::int32_t cell) {
+// The picture as charts are packed into it.
+struct Grid {
+    Cells cells;            // taken or free
+    std::int32_t top;       // charts are laid below this row
+    std::int32_t cell = 1;  // a cell's side in texels
+    std::int32_t stride = 1;
+};
+
+// Gives all charts places among the free cells; false if one finds none. upright, turned: of the same charts.
+bool pack(ChartLayout& layout, const Shape& upright, const Shape& turned, const Grid& grid) {
+    auto picture = grid.cells;
     std::vector<std::size_t> order(layout.charts.size()), sizes;
     std::iota(order.begin(), order.end(), std::size_t{0});
     for (const auto& cells : upright.cells)
         sizes.push_back(static_cast<std::size_t>(cells.width()) * static_cast<std::size_t>(cells.height()));
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return sizes[a] > sizes[b]; });
     for (const auto chart : order) {
-        const auto first = place_for(upright.cells[chart], picture, top);
-        const auto second = place_for(turned.cells[chart], picture, top);
+        const auto first = place_for(upright.cells[chart], picture, grid.top, grid.stride);
+        const auto second = place_for(turned.cells[chart], picture, grid.top, grid.stride);
         if (!first && !second) return false;
         const auto end = [&](const auto& place, const Shape& shape) {
             return place ? (*place)[1] + shape.cells[chart].height() : std::numeric_limits<std::int32_t>::max();
@@ -183,14 +224,16 @@ bool pack(ChartLayout& layout, const Shape& upright, const Shape& turned, Cells 
         const auto [x, y] = turns ? *second : *first;
         picture.add(shape.cells[chart], x, y);
         layout.charts[chart].rotation = shape.alone.charts[chart].rotation;
-        layout.charts[chart].x = (x + 1) * cell;
-        layout.charts[chart].y = (y + 1) * cell;
+        layout.charts[chart].x = (x + ring_of(grid.cell)) * grid.cell;
+        layout.charts[chart].y = (y + ring_of(grid.cell)) * grid.cell;
     }
     return true;
 }
 
-Cells empty_picture(const StreamTexture& picture, std::int32_t cell) {
-    return {picture.width / cell, picture.height / cell};
+Grid empty_picture(const StreamTexture& picture) {
+    const auto cell = cell_of(picture);
+    const Cells cells(picture.width / cell, picture.height / cell);
+    return {cells, cells.height(), cell, stride_of(picture, cell)};
 }
 
 Shape shape_of(ChartLayout layout, std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
@@ -207,11 +250,11 @@ ChartLayout turned_by_a_quarter(ChartLayout layout) {
 }
 
 // Packs the charts at the layout's scale.
-bool pack_at_scale(ChartLayout& layout, const Cells& picture, std::int32_t top, std::int32_t cell,
-                   std::span<const LatticePoint> positions, std::span<const Triangle> triangles) {
-    const auto upright = shape_of(layout, positions, triangles, cell);
-    const auto turned = shape_of(turned_by_a_quarter(layout), positions, triangles, cell);
-    return pack(layout, upright, turned, picture, top, cell);
+bool pack_at_scale(ChartLayout& layout, const Grid& grid, std::span<const LatticePoint> positions,
+                   std::span<const Triangle> triangles) {
+    const auto upright = shape_of(layout, positions, triangles, grid.cell);
+    const auto turned = shape_of(turned_by_a_quarter(layout), positions, triangles, grid.cell);
+    return pack(layout, upright, turned, grid);
 }
 
 double area_of(std::span<const LatticePoint> positions, std::span<const Triangle> triangles) {
@@ -231,6 +274,34 @@ Result<PlacedCharts> placed(const ChartLayout& layout, std::span<const LatticePo
     return out;
 }
 
+// Charts with more detail than others get more texels a millimetre: by the root of how much more, within bounds, so
+// that neither takes all.
+void set_sizes(ChartLayout& layout, std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
+               std::span<const float> detail) {
+    struct Sum {
+        double area = 0, detail = 0;
+    };
+    std::vector<Sum> charts(layout.charts.size());
+    Sum all;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        const double area = length(area_vector(positions, triangles[t])) / 2;
+        double mean = 0;
+        for (const auto v : triangles[t]) mean += static_cast<double>(detail[v]) / 3;
+        for (auto* sum : {&charts[layout.chart_of_triangle[t]], &all}) {
+            sum->area += area;
+            sum->detail += area * mean;
+        }
+    }
+    if (!(all.area > 0 && all.detail > 0)) return;
+    constexpr double least = 0.8, most = 1.6;
+    for (std::size_t chart = 0; chart < charts.size(); ++chart) {
+        const auto& [area, sum] = charts[chart];
+        const double share = area > 0 ? sum / area / (all.detail / all.area) : 1;
+        layout.charts[chart].size =
+            static_cast<std::int32_t>(std::lround(usual_size * std::clamp(std::sqrt(share), least, most)));
+    }
+}
+
 constexpr double scale_unit = static_cast<double>(texel) * (1 << 16);  // a texel a lattice unit
 
 std::uint32_t whole_scale(double scale) {
@@ -240,12 +311,12 @@ std::uint32_t whole_scale(double scale) {
 }  // namespace
 
 Result<PlacedCharts> lay_out(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
-                             const StreamTexture& picture) {
-    const auto cut = cut_into_charts(positions, triangles);
+                             const StreamTexture& picture, std::span<const float> detail) {
+    auto cut = cut_into_charts(positions, triangles);
+    if (!detail.empty()) set_sizes(cut, positions, triangles, detail);
     auto layout = cut;
-    const auto cell = cell_of(picture);
-    const auto empty = empty_picture(picture, cell);
-    const auto top = static_cast<std::int32_t>(std::floor(empty.height() * (1 - free_share)));
+    auto grid = empty_picture(picture);
+    grid.top = static_cast<std::int32_t>(std::floor(grid.cells.height() * (1 - free_share)));
     // The largest scale that fits lies below that at which triangles seen from the front would fill the picture. Where
     // even the smallest does not fit, there are more charts than the picture has gutters for.
     const double area = std::max(area_of(positions, triangles), 1.0);
@@ -254,7 +325,7 @@ Result<PlacedCharts> lay_out(std::span<const LatticePoint> positions, std::span<
     const auto try_scale = [&](double scale) {
         auto tried = cut;
         tried.scale = whole_scale(scale);
-        const bool fine = pack_at_scale(tried, empty, top, cell, positions, triangles);
+        const bool fine = pack_at_scale(tried, grid, positions, triangles);
         if (fine) layout = std::move(tried), fits = scale;
         return fine;
     };
@@ -280,20 +351,20 @@ std::optional<PlacedCharts> lay_out_beside(std::span<const LatticePoint> positio
                                            std::uint32_t scale) {
     auto layout = cut_into_charts(positions, triangles);
     layout.scale = scale;
-    const auto cell = cell_of(picture);
-    auto cells = empty_picture(picture, cell);
+    auto grid = empty_picture(picture);
     const std::array<std::int64_t, 2> sides = {picture.width, picture.height};
     for (auto corners : taken) {
         for (auto& corner : corners)
             for (std::size_t axis = 0; axis < 2; ++axis)
                 corner[axis] = static_cast<std::int32_t>((corner[axis] * sides[axis]) >> (picture_bits - texel_bits));
-        cover(cells, corners, cell, 0);
+        cover(grid.cells, corners, grid.cell, 0);
     }
+    grid.cells = grid.cells.grown(ring_of(grid.cell));
     // Smaller charts rather than none, down to half the size.
     for (const std::int32_t size : {usual_size, 13, 10, 8}) {
         auto tried = layout;
         for (auto& chart : tried.charts) chart.size = size;
-        if (!pack_at_scale(tried, cells, cells.height(), cell, positions, triangles)) continue;
+        if (!pack_at_scale(tried, grid, positions, triangles)) continue;
         auto out = placed(tried, positions, triangles, picture);
         return out ? std::optional(std::move(*out)) : std::nullopt;
     }

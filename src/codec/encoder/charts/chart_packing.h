@@ -18,9 +18,10 @@ struct PlacedCharts {
     std::uint32_t scale = 0;               // ChartLayout::scale
 };
 
-// A whole mesh's: as large as the picture lets them be with some room left for the charts of patches.
+// A whole mesh's: as large as the picture lets them be with some room left for the charts of patches. detail: how much
+// there is to see at each position, in any unit (captured_detail.h), by which charts differ in size; or none.
 Result<PlacedCharts> lay_out(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
-                             const StreamTexture& picture);
+                             const StreamTexture& picture, std::span<const float> detail = {});
 
 // A piece's, beside triangles that have coordinates and keep them: at their scale, or down to half of it where the
 // picture is nearly full; nothing if there is no room.

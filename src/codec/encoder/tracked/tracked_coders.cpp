@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "codec/encoder/charts/captured_detail.h"
 #include "codec/encoder/charts/chart_packing.h"
 #include "codec/encoder/level_colours.h"
 #include "codec/encoder/leveled_intra.h"
@@ -39,9 +40,10 @@ struct Charts {
     std::uint32_t scale = 0;
 };
 
-Result<Charts> add_charts(const LatticeMesh& mesh, const StreamTexture& texture, FramePayload& payload) {
+Result<Charts> add_charts(const LatticeMesh& mesh, const SurfaceIndex& captured, const StreamTexture& texture,
+                          FramePayload& payload) {
     if (texture.layout != TextureLayout::charts || mesh.triangles.empty()) return Charts();
-    auto placed = lay_out(mesh.positions, mesh.triangles, texture);
+    auto placed = lay_out(mesh.positions, mesh.triangles, texture, captured_detail(mesh.positions, captured));
     if (!placed) return tl::unexpected(placed.error());
     payload.set(Layer::charts, std::move(placed->layer));
     auto textured = textured_surface(mesh.positions.size(), mesh.triangles, std::move(placed->corners));
@@ -92,7 +94,7 @@ Result<TrackedIntra> sent_as(const TrackedWork& work, CodedIntra coded, Presence
                              const FrameSteps& steps, FrameReason reason) {
     const auto& configuration = work.configuration;
     StageClock clock(work.stages);
-    auto charts = add_charts(coded.decoded, configuration.options.texture, coded.payload);
+    auto charts = add_charts(coded.decoded, work.surface, configuration.options.texture, coded.payload);
     if (!charts) return tl::unexpected(charts.error());
     TrackedIntra out;
     out.step = coded.step;
