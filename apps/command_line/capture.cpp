@@ -401,10 +401,10 @@ Result<void> Capture::look_for_images() {
     const bool needs_one = texture_use() != TextureUse::none && options_.texture.files.empty() && !peeked_->texture &&
                            peeked_->mesh.colours.empty() && !peeked_->mesh.texcoords.empty();
     if (pipe_ || !needs_one || frames_ == 1) return {};
-    constexpr std::size_t samples = 8;
-    std::vector<std::size_t> places = textures_.places_with_image_beside(begin_, begin_ + frames_, samples);
-    for (std::size_t k = 1; places.empty() && k <= std::min(samples, frames_ - 1); ++k)
-        places.push_back(begin_ + k * (frames_ - 1) / std::min(samples, frames_ - 1));
+    constexpr std::size_t most = 8;
+    auto places = textures_.places_with_image_beside(begin_, begin_ + frames_, most);
+    const std::size_t samples = places.empty() ? std::min(most, frames_ - 1) : 0;
+    for (std::size_t k = 1; k <= samples; ++k) places.push_back(begin_ + k * (frames_ - 1) / samples);
     for (const auto place : places) {
         auto mesh = textures().read(place, texture_use(), mesh_options());
         if (!mesh || !mesh->texture || mesh->mesh.positions.empty()) continue;

@@ -461,6 +461,8 @@ public:
             const auto next = sharing_->next();
             passes_.picture_quality = next.picture_quality;
             mesh_bits_ = next.mesh_bits;
+            constexpr double too_far = 12;  // steps of quality from those that the number of pixels is for
+            if (std::abs(next.picture_quality - quality_of_size_) > too_far) follow_with_size(next.picture_quality);
             // One quality for all pictures knows nothing of a buffer; a rate does.
             if (outcome.rate.buffer.overflows()) passes_.picture_quality.reset();
         }
@@ -476,12 +478,18 @@ private:
         sharing_.emplace(of_all_ * seconds);
         mesh_bits_ = share_of_meshes * of_all_ * seconds;
         passes_.picture_quality = quality;
+        usual_side_ = passes_.settings.texture.width;
+        follow_with_size(quality);
+    }
+    void follow_with_size(double quality) {
+        quality_of_size_ = quality;
         auto& texture = passes_.settings.texture;
         if (texture.layout == TextureLayout::charts && passes_.plan.pictures.size == 0)
-            texture.width = texture.height = picture_side_of(texture.width, quality);
+            texture.width = texture.height = picture_side_of(usual_side_, std::min(quality, 100.0));
     }
     Passes& passes_;
-    double of_all_, mesh_bits_ = 0;
+    double of_all_, mesh_bits_ = 0, quality_of_size_ = 0;
+    int usual_side_ = 0;  // of pictures at the default quality
     std::optional<RateSharing> sharing_ = {};
 };
 

@@ -65,8 +65,8 @@ int quantiser_of(PictureCoder coder, double quality) {
 }
 
 int picture_side_of(int usual_side, double quality) {
-    constexpr double doubles_in = 58;  // steps of quality: twice the usual side at 100
-    constexpr double step = 64, least = 128;
+    constexpr double doubles_in = 58;         // steps of quality: twice the usual side at 100
+    constexpr double step = 64, least = 256;  // below, charts of a person may find no room
     const double side = usual_side * std::exp2((quality - default_quality) / doubles_in);
     return static_cast<int>(std::clamp(step * std::round(side / step), least, static_cast<double>(most_picture_side)));
 }

@@ -145,8 +145,8 @@ expect 3 "is not sound" "$htvm" verify repaired.htvm
 expect 3 "of the texture could not be decoded; no frame was lost" "$htvm" decode repaired.htvm -o repaired
 
 # A rate that meshes and pictures share, by default in several passes, which meet it.
-for rate in 0.5 1.2; do
-    "$htvm" encode walk --bitrate $rate --json -o rate.htvm 2>/dev/null >rate.json || fail "--bitrate $rate"
+for rate in 0.9 1.6; do
+    "$htvm" encode walk --bitrate $rate --texture-size 256 --json -o rate.htvm 2>/dev/null >rate.json || fail "--bitrate $rate"
     python3 - rate.json $rate <<'PYTHON' || fail "$rate Mbit/s are not met within 5 %"
 import json, sys
 said = json.load(open(sys.argv[1]))
@@ -154,7 +154,7 @@ sys.exit(not abs(said["megabits_per_second"] / float(sys.argv[2]) - 1) <= 0.05)
 PYTHON
 done
 # More than all can use is no fault.
-expect 0 "the highest there is" "$htvm" encode walk --bitrate 100 --texture-size 64 -o rate.htvm
+expect 0 "the highest there is" "$htvm" encode walk --bitrate 100 --texture-size 128 -o rate.htvm
 expect 5 "above its --bitrate" "$htvm" encode walk --bitrate 0.03 --buffer 20 -o rate.htvm
 "$htvm" encode walk --profile topology --texture-as captured --bitrate 4 -o rate.htvm 2>/dev/null
 python3 - "$("$htvm" info rate.htvm --json | python3 -c 'import json, sys; print(json.load(sys.stdin)["megabits_per_second"])')" <<'PYTHON' || fail "the rate is not met"

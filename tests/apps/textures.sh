@@ -16,7 +16,7 @@ expect 1 "64 to 4096 pixels" "$htvm" synth x --frames 1 --texture 5000
 expect 0 "the texture (capture/frame_00000.jpg, 256 x 256 pixels) is drawn anew in a layout that lasts, and coded as video; --texture-as colours has its colours" \
     "$htvm" encode capture -o pictures.htvm
 expect 0 "3 pictures" "$htvm" info pictures.htvm
-expect 0 "pictures have 192 x 192 pixels" "$htvm" encode capture -q 20 -o coarse.htvm
+expect 0 "pictures have 512 x 512 pixels" "$htvm" encode capture -q 100 -o fine.htvm
 expect 0 "the texture (capture/frame_00000.jpg, 256 x 256 pixels) is coded as video, with its coordinates as captured" \
     "$htvm" encode capture --profile topology -o captured.htvm
 # Where there are none, their options do nothing.
@@ -48,7 +48,8 @@ cmp -s jobs.htvm job.htvm || fail "jobs make another stream"
 # Standard input: an image by its comment, and one for all.
 (cd capture && cat frame_0000*.ply | "$htvm" encode - -o ../piped.htvm --quiet)
 expect 0 "3 pictures" "$htvm" info piped.htvm
-(cd capture && cat frame_0000*.ply | expect 0 "without its details: frames are waited for" "$htvm" encode - --deadline 1000 -o ../timed.htvm)
+expect 0 "without its details: frames are waited for" \
+    bash -c "cd capture && cat frame_0000*.ply | '$htvm' encode - --deadline 1000 -o ../timed.htvm"
 "$htvm" decode timed.htvm -o timed/ --quiet
 head -c 400 timed/00000.ply | grep -qa "property uchar red" || fail "meshes that are waited for have no colours"
 expect 1 "take one image for all" bash -c "cat capture/*.ply | '$htvm' encode - --texture 'capture/frame_%05d.jpg' -o x.htvm"
