@@ -456,7 +456,11 @@ public:
             if (std::abs(of_wanted - 1) <= rate_tolerance) return false;
             mesh_bits_ /= of_wanted;
         } else {
-            sharing_->add({quality_range(outcome.rate).mean, of_meshes, *passes_.picture_quality, of_pictures});
+            const double quality = quality_range(outcome.rate).mean;
+            sharing_->add({quality, of_meshes, *passes_.picture_quality, of_pictures});
+            note(fmt::format("so shared, meshes take {:.3f} Mbit/s at quality {:.0f}, pictures {:.3f} at {:.0f}",
+                             of_meshes / seconds / 1e6, quality, of_pictures / seconds / 1e6,
+                             *passes_.picture_quality));
             if (sharing_->is_met() && !outcome.rate.buffer.overflows()) return false;
             const auto next = sharing_->next();
             passes_.picture_quality = next.picture_quality;
