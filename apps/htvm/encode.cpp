@@ -461,14 +461,17 @@ public:
             note(fmt::format("so shared, meshes take {:.3f} Mbit/s at quality {:.0f}, pictures {:.3f} at {:.0f}",
                              of_meshes / seconds / 1e6, quality, of_pictures / seconds / 1e6,
                              *passes_.picture_quality));
-            if (sharing_->is_met() && !outcome.rate.buffer.overflows()) return false;
+            // One quality for all pictures knows nothing of a buffer, which may be too small though the rate is met.
+            constexpr double nearly = 0.1;
+            const bool overfills = outcome.rate.buffer.overflows() &&
+                                   std::abs((of_meshes + of_pictures) / sharing_->wanted_bits() - 1) < nearly;
+            if (sharing_->is_met() && !overfills) return false;
             const auto next = sharing_->next();
             passes_.picture_quality = next.picture_quality;
             mesh_bits_ = next.mesh_bits;
             constexpr double too_far = 12;  // steps of quality from those that the number of pixels is for
             if (std::abs(next.picture_quality - quality_of_size_) > too_far) follow_with_size(next.picture_quality);
-            // One quality for all pictures knows nothing of a buffer; a rate does.
-            if (outcome.rate.buffer.overflows()) passes_.picture_quality.reset();
+            if (overfills) passes_.picture_quality.reset();  // a rate knows of it
         }
         passes_.settings.rate.bits_per_second = mesh_bits_ / seconds;
         return true;

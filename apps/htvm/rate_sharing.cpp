@@ -9,7 +9,7 @@ namespace htvm::app {
 namespace {
 
 // log2(bits) for a step of quality: as usual, until two passes tell; and what they may tell.
-constexpr double usual_mesh_slope = 0.07, usual_picture_slope = 0.05, least_slope = 0.015, most_slope = 0.2;
+constexpr double usual_mesh_slope = 0.08, usual_picture_slope = 0.08, least_slope = 0.015, most_slope = 0.2;
 
 double slope_between(double quality_a, double bits_a, double quality_b, double bits_b, double usual) {
     constexpr double far_enough = 2;  // steps: nearer ones tell more of chance
