@@ -30,6 +30,13 @@ struct Model {
     }
 };
 
+constexpr double finest_mesh = 99.5;
+
+bool is_balanced(const SharedPass& pass) {
+    constexpr double alike = 8;  // steps of quality that nobody tells apart
+    return std::abs(pass.mesh_quality - pass.picture_quality) <= alike || pass.mesh_quality >= finest_mesh;
+}
+
 Model model_of(const std::vector<SharedPass>& passes) {
     Model out{passes.back()};
     if (passes.size() < 2) return out;
@@ -43,19 +50,23 @@ Model model_of(const std::vector<SharedPass>& passes) {
 }  // namespace
 
 bool RateSharing::is_met() const {
-    if (passes_.empty()) return false;
-    const auto& last = passes_.back();
-    constexpr double alike = 8;  // steps of quality that nobody tells apart
-    const bool is_balanced = std::abs(last.mesh_quality - last.picture_quality) <= alike || last.mesh_quality >= 99.5;
-    return is_balanced && std::abs(last.bits() / wanted_bits_ - 1) <= rate_tolerance;
+    return !passes_.empty() && is_balanced(passes_.back()) &&
+           std::abs(passes_.back().bits() / wanted_bits_ - 1) <= rate_tolerance;
 }
 
 bool RateSharing::is_finest() const {
-    return !passes_.empty() && passes_.back().bits() < wanted_bits_ && passes_.back().mesh_quality >= 99.5 &&
+    return !passes_.empty() && passes_.back().bits() < wanted_bits_ && passes_.back().mesh_quality >= finest_mesh &&
            passes_.back().picture_quality >= finest_picture_quality - 0.5;
 }
 
 RateSharing::Next RateSharing::next() const {
+    // Near the rate, pictures stay as they are, whose quantiser has steps of up to a fifth of their bits; meshes, which
+    // are controlled, take the rest.
+    constexpr double near = 0.2;
+    const auto& last = passes_.back();
+    if (is_balanced(last) && last.mesh_quality < finest_mesh && std::abs(last.bits() / wanted_bits_ - 1) < near &&
+        last.picture_bits < 0.9 * wanted_bits_)
+        return {last.picture_quality, wanted_bits_ - last.picture_bits};
     const auto model = model_of(passes_);
     double low = 0, high = finest_picture_quality;
     for (int i = 0; i < 40; ++i) {
