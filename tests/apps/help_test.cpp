@@ -196,7 +196,7 @@ TEST(CommandLine, AContradictionIsAUsageErrorThatNamesTheOption) {
     ends_with({"encode", "capture", "-o", "x.htvm", "--profile", "best"},
               "--profile: best is none of tracked, topology, paper; 'htvm encode --help-all' tells more");
     ends_with({"encode", "capture", "-o", "x.htvm", "--bitrate", "4", "-q", "50"}, "--quality excludes --bitrate");
-    ends_with({"encode", "capture", "-o", "x.htvm", "--preset", "web", "-q", "50"}, "--preset excludes --quality");
+    ends_with({"encode", "capture", "-o", "x.htvm", "--preset", "web", "-q", "50"}, "--quality excludes --preset");
     ends_with({"encode", "capture", "-o", "x.htvm", "--preset", "web", "--bitrate", "4"},
               "--preset excludes --bitrate");
     ends_with({"encode", "capture", "-o", "x.htvm", "--passes", "2"}, "--passes requires --bitrate");
