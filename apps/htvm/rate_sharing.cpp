@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "rate_passes.h"
 
@@ -32,8 +33,10 @@ struct Model {
 
 constexpr double finest_mesh = 99.5;
 
-bool is_balanced(const SharedPass& pass) {
-    constexpr double alike = 8;  // steps of quality that nobody tells apart
+// Whether nobody tells the qualities apart, or, after some passes, they at least do not hurt.
+bool is_balanced(const SharedPass& pass, std::size_t passes) {
+    constexpr std::size_t some = 3;
+    const double alike = passes < some ? 8 : 20;  // steps of quality
     return std::abs(pass.mesh_quality - pass.picture_quality) <= alike || pass.mesh_quality >= finest_mesh;
 }
 
@@ -50,7 +53,7 @@ Model model_of(const std::vector<SharedPass>& passes) {
 }  // namespace
 
 bool RateSharing::is_met() const {
-    return !passes_.empty() && is_balanced(passes_.back()) &&
+    return !passes_.empty() && is_balanced(passes_.back(), passes_.size()) &&
            std::abs(passes_.back().bits() / wanted_bits_ - 1) <= rate_tolerance;
 }
 
@@ -61,13 +64,14 @@ bool RateSharing::is_finest() const {
 
 RateSharing::Next RateSharing::next() const {
     // Near the rate, pictures stay as they are, whose quantiser has steps of up to a fifth of their bits; meshes, which
-    // are controlled, take the rest.
-    constexpr double near = 0.2;
-    const auto& last = passes_.back();
-    if (is_balanced(last) && last.mesh_quality < finest_mesh && std::abs(last.bits() / wanted_bits_ - 1) < near &&
-        last.picture_bits < 0.9 * wanted_bits_)
-        return {last.picture_quality, wanted_bits_ - last.picture_bits};
+    // are controlled, take the rest, as far as they need not change much for it.
     const auto model = model_of(passes_);
+    const auto& last = passes_.back();
+    const double rest = wanted_bits_ - last.picture_bits;
+    constexpr double much = 5;  // steps of quality
+    if (is_balanced(last, 0) && last.mesh_quality < finest_mesh && rest > 0 && last.mesh_bits > 0 &&
+        std::abs(std::log2(rest / last.mesh_bits)) < much * usual_mesh_slope)
+        return {last.picture_quality, rest};
     double low = 0, high = finest_picture_quality;
     for (int i = 0; i < 40; ++i) {
         const double middle = (low + high) / 2;
