@@ -169,9 +169,8 @@ FrontPage front_page() {
              "The meshes, one file per frame (PLY, OBJ, Draco, glTF): a folder, a pattern such as\n"
              "scan_%05d.ply, files in their order, or - for PLY after PLY on standard input"},
             {"--output", "The stream: a file, - for standard output, or a hub, ws://HOST:PORT/publish/NAME"},
-            {"--quality",
-             fmt::format("0 to 100 (default {}): more is finer, in more bits; or --preset studio ({}), master ({})",
-                         default_quality, quality_of(Preset::studio), quality_of(Preset::master))},
+            {"--quality", fmt::format("0 to 100 (default {}; --preset studio: {}, master: {}): more is finer",
+                                      default_quality, quality_of(Preset::studio), quality_of(Preset::master))},
             {"--bitrate", "Mbit/s to keep to; the quality follows"},
             {"--target-error", "How far each frame's surface may be off, mm (RMS); the quality follows"},
             {"--profile",
