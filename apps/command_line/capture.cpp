@@ -154,7 +154,9 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
         "What becomes of a texture: picture, drawn anew in a layout that lasts, and coded as video (with --profile\n"
         "tracked); captured, coordinates as they are and images coded as video (with --profile topology); keep,\n"
         "the same with the images' files as they are; coordinates, the same without images; or colours at the\n"
-        "vertices. Default: colours, unless the meshes have vertex colours of their own")
+        "vertices. Default: of encode picture, with --profile topology captured; colours with --profile paper, --jobs\n"
+        "and --job, and where frames are waited for, as with --deadline and a hub; of meshes that have vertex colours\n"
+        "of their own these")
         ->group(heading::textures);
 }
 
@@ -371,39 +373,58 @@ Result<std::optional<TexturedMesh>> Capture::read_next_file() {
     return std::optional<TexturedMesh>{std::move(*mesh)};
 }
 
-// Whether a mesh has neither colours nor an image, while images lie beside others: it is no example of the capture.
-bool Capture::lacks_its_image(const TexturedMesh& mesh) const {
-    const bool needs_one = texture_use() != TextureUse::none && options_.texture.files.empty() && !mesh.texture &&
-                           mesh.mesh.colours.empty() && !mesh.mesh.texcoords.empty();
-    return needs_one && !textures_.known_images().empty();
-}
-
-// Reads the first mesh that can be read, has vertices and does not lack its image; of several that lack it the first.
+// Reads the first mesh that can be read and has vertices.
 Result<void> Capture::find_first() {
     std::optional<Error> error;
     millimetres_per_unit_ = 1;
-    constexpr std::size_t most_without_image = 16;
-    std::size_t without_image = 0;
     for (std::size_t end = begin_ + frames_;;) {
         auto mesh = pipe_ ? read_pipe() : read_next_file();
         if (mesh && !*mesh) break;
         if (!mesh && !error) error = mesh.error();
-        const bool has_vertices = mesh && !(*mesh)->mesh.positions.empty();
-        const bool serves = has_vertices && (pipe_ || !lacks_its_image(**mesh));
-        if (mesh && (serves || !peeked_ || peeked_->mesh.positions.empty())) {
+        const bool serves = mesh && !(*mesh)->mesh.positions.empty();
+        if (mesh && (serves || !peeked_)) {
             peeked_ = std::move(**mesh);
             peeked_at_ = *at_;
         }
-        without_image += has_vertices && !serves;
-        if (pipe_ || serves || next_ == end || without_image == most_without_image) break;
+        if (pipe_ || serves || next_ == end) break;
     }
-    // What was found in it, once more.
-    if (peeked_ && without_image > 0 && *at_ != peeked_at_)
-        if (auto again = textures().read(peeked_at_, texture_use(), mesh_options())) peeked_ = std::move(*again);
     if (!peeked_ && error) return tl::unexpected(*error);
     if (!peeked_)
         return fail(ErrorKind::bad_input, "there is no mesh in " + (pipe_ ? "standard input" : input_name(options_)));
+    return look_for_images();
+}
+
+// Where the first mesh has neither colours nor an image, but others have one, it lacks it, and is no example of the
+// capture: the first of those looked at that has one is. These are all that have one beside them, or, as others name
+// theirs inside, some from everywhere.
+Result<void> Capture::look_for_images() {
+    const bool needs_one = texture_use() != TextureUse::none && options_.texture.files.empty() && !peeked_->texture &&
+                           peeked_->mesh.colours.empty() && !peeked_->mesh.texcoords.empty();
+    if (pipe_ || !needs_one || frames_ == 1) return {};
+    constexpr std::size_t most = 8;
+    auto places = textures_.places_with_image_beside(begin_, begin_ + frames_, most);
+    const std::size_t samples = places.empty() ? std::min(most, frames_ - 1) : 0;
+    for (std::size_t k = 1; k <= samples; ++k) places.push_back(begin_ + k * (frames_ - 1) / samples);
+    for (const auto place : places) {
+        auto mesh = textures().read(place, texture_use(), mesh_options());
+        if (!mesh || !mesh->texture || mesh->mesh.positions.empty()) continue;
+        peeked_ = std::move(*mesh);
+        at_ = peeked_at_ = place;
+        return {};
+    }
+    // What was found in it, once more.
+    auto again = textures().read(peeked_at_, texture_use(), mesh_options());
+    if (!again) return tl::unexpected(again.error());
+    peeked_ = std::move(*again);
     return {};
+}
+
+// Images become what was asked for, or the default. Colours that multiply an image's go on as colours at vertices by
+// default, as pictures would be without them.
+void Capture::decide_texture() {
+    texture_as_ = options_.texture_as;
+    if (texture_as_ != TextureAs::by_default || !peeked_->texture) return;
+    texture_as_ = peeked_->mesh.colours.empty() ? options_.of_images : TextureAs::colours;
 }
 
 // From the first mesh, in its file's unit.
@@ -506,6 +527,7 @@ constexpr double coarse_step = 0.05;  // mm: below that it shows nowhere
 // The first mesh, as all are read from here on.
 Result<void> Capture::read_first_again() {
     const bool is_other = shift_ != GlobalShift{} || colour_range_;
+    decide_texture();
     if (!pipe_ && is_other) {
         auto again = textures_.read(peeked_at_, texture_use(), mesh_options());
         if (!again) return tl::unexpected(again.error());
@@ -513,7 +535,7 @@ Result<void> Capture::read_first_again() {
     } else if (auto ok = scale_positions(peeked_->mesh, millimetres_per_unit_); !ok) {
         return ok;
     }
-    if (keeps_pictures(options_.texture_as) && textures_.findings().texture.colours_multiply && peeked_->texture &&
+    if (keeps_pictures(texture_as_) && textures_.findings().texture.colours_multiply && peeked_->texture &&
         !peeked_->mesh.colours.empty())
         warn(
             "the colours at vertices, which multiply those of the images, are left out of the pictures; --texture-as "
@@ -577,17 +599,22 @@ void Capture::tell_of_texture() const {
     const auto& image = textures_.image_name();
     const auto& mesh = peeked_->mesh;
     const auto& texture = peeked_->texture;
-    if (texture && keeps_pictures(options_.texture_as)) {
-        note(fmt::format("the texture ({}, {} x {} pixels) is {}", image, texture->width, texture->height,
-                         options_.texture_as == TextureAs::keep ? "kept as it is"
-                         : options_.texture_as == TextureAs::picture
-                             ? "drawn anew in a layout that lasts, and coded as video"
-                             : "coded as video, with its coordinates as captured"));
+    const bool is_default = options_.texture_as == TextureAs::by_default;
+    if (texture && keeps_pictures(texture_as_)) {
+        note(fmt::format("the texture ({}, {} x {} pixels) is {}{}", image, texture->width, texture->height,
+                         texture_as_ == TextureAs::keep      ? "kept as it is"
+                         : texture_as_ == TextureAs::picture ? "drawn anew in a layout that lasts, and coded as video"
+                                                             : "coded as video, with its coordinates as captured",
+                         is_default ? "; --texture-as colours has its colours at the vertices instead, without its "
+                                      "details, in less time and with fewer bits"
+                                    : ""));
     } else if (texture) {
-        note(
-            fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices; --texture-as "
-                        "coordinates keeps its coordinates instead",
-                        image, texture->width, texture->height));
+        note(fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices{}", image,
+                         texture->width, texture->height,
+                         !is_default                        ? ""
+                         : !peeked_->mesh.colours.empty()   ? ", times those that these have"
+                         : options_.why_no_pictures.empty() ? ""
+                                                            : ", without its details: " + options_.why_no_pictures));
     } else if (mesh.texcoords.empty()) {
         const bool asked =
             options_.texture_as == TextureAs::coordinates || options_.texture.origin != TextureOrigin::by_format;
@@ -655,8 +682,8 @@ Capture::Wanted Capture::wanted() const {
 }
 
 Capture::PicturesOf Capture::pictures_of() const {
-    if (!keeps_pictures(options_.texture_as)) return PicturesOf::nothing;
-    return options_.texture_as == TextureAs::picture ? PicturesOf::stream : PicturesOf::capture;
+    if (!keeps_pictures(texture_as_)) return PicturesOf::nothing;
+    return texture_as_ == TextureAs::picture ? PicturesOf::stream : PicturesOf::capture;
 }
 
 MeshFileOptions Capture::mesh_options() const {

@@ -33,7 +33,7 @@ namespace htvm::app {
 
 // What becomes of a texture.
 enum class TextureAs : std::uint8_t {
-    by_default,   // colours at the vertices of meshes that have no colours of their own
+    by_default,   // as CaptureOptions::of_images says, of meshes that have no colours of their own
     colours,      // colours at the vertices, whatever the meshes have
     coordinates,  // coordinates stay as they are, and the image is left out
     picture,      // it is drawn anew in a layout that lasts, and coded as video
@@ -70,8 +70,10 @@ struct CaptureOptions {
     double skeleton_offset = 0;      // seconds added to the skeleton's clock
     TextureOptions texture;          // where images are
     TextureAs texture_as = TextureAs::by_default;
-    bool tells_odd_sizes = true;             // warns of frames whose size is odd; else who looks at all of them does
-    bool keeps_idle_texcoords = true;        // texture coordinates for which no image is used, unless asked for
+    TextureAs of_images = TextureAs::colours;  // what becomes of them by default: colours, picture or captured
+    std::string why_no_pictures;               // where these are colours, for people; empty: nobody expects pictures
+    bool tells_odd_sizes = true;               // warns of frames whose size is odd; else who looks at all of them does
+    bool keeps_idle_texcoords = true;          // texture coordinates for which no image is used, unless asked for
     WhileBusy while_busy = WhileBusy::wait;  // of standard input: what becomes of frames that come faster than they are
                                              // taken
 };
@@ -126,6 +128,8 @@ public:
 
     const std::vector<std::filesystem::path>& files() const { return files_.paths; }  // none: standard input
     std::size_t frames() const { return frames_; }  // 0: not known, from standard input
+    // What becomes of the capture's texture: as asked for, or the default, which follows from its first mesh.
+    TextureAs texture_as() const { return texture_as_; }
     // The first frame that can be read, with its texture; null if it has none. Before next() and take_first().
     const TexturedMesh* first_textured() const { return peeked_ && peeked_->texture ? &*peeked_ : nullptr; }
     std::size_t dropped() const { return pipe_ ? pipe_->dropped() : 0; }
@@ -147,8 +151,9 @@ private:
     Result<void> find_listed_times();
     void find_times_in_files();
     Result<void> find_poses();
-    bool lacks_its_image(const TexturedMesh& mesh) const;
     Result<void> find_first();
+    Result<void> look_for_images();
+    void decide_texture();
     Result<void> find_unit();
     Result<Mesh> first_near_origin();
     Result<void> take_off_shift();
@@ -218,8 +223,9 @@ private:
     std::vector<double> radii_;
     std::size_t begin_ = 0, frames_ = 0;  // place of the first frame; their number, 0 where it is not known
 
-    TextureFiles textures_;               // until ahead_ has it
-    bool has_texture_ = false;            // whether the first mesh's colours are those of its texture
+    TextureFiles textures_;     // until ahead_ has it
+    bool has_texture_ = false;  // whether the first mesh has one that is used
+    TextureAs texture_as_ = TextureAs::by_default;
     std::optional<TexturedMesh> peeked_;  // the first mesh that can be read, in mm, read beforehand to tell its unit
     std::size_t peeked_at_ = 0;           // its place
     std::size_t next_ = 0, taken_ = 0;    // place of the next frame; frames that next() gave or failed at

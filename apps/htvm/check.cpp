@@ -194,6 +194,11 @@ Result<Report> look_at_all(const Options& options) {
 
 // ---- Judging --------------------------------------------------------------------------------------------------------
 
+bool has_images(const Report& report) {
+    return std::any_of(report.frames.begin(), report.frames.end(),
+                       [](const auto& frame) { return frame.texture_width > 0; });
+}
+
 // Values are those of the frames that could be read.
 template <class Value>
 std::vector<double> values_of(const Report& report, Value value) {
@@ -417,9 +422,10 @@ void print_report(const Report& report, const Judgement& j, const std::string& i
     fmt::print("  flicker      area {:.2f} %, brightness {:.2f} % from frame to frame\n", 100 * j.area_flicker,
                100 * j.light_flicker);
     if (report.trial.frames > 0)
-        fmt::print("  encoded      the first {} with the defaults: {:.2f} Mbit/s, {} I-, {} TP-frames\n",
-                   counted(report.trial.frames, "frame"), report.trial.megabits_per_second, report.trial.intra,
-                   report.trial.patched);
+        fmt::print("  encoded      the first {} with the defaults{}: {:.2f} Mbit/s, {} I-, {} TP-frames\n",
+                   counted(report.trial.frames, "frame"),
+                   has_images(report) ? ", but with colours in place of pictures" : "",
+                   report.trial.megabits_per_second, report.trial.intra, report.trial.patched);
     if (!report.lacks_images.empty())
         fmt::print("  bad          every frame; the first of them: {}\n", report.lacks_images);
     print_frames("bad", report, j.bad, [](const auto& frame) { return frame.wrong; });

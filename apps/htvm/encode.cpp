@@ -22,6 +22,7 @@
 #include "metrics/front.h"
 #include "rate_passes.h"
 #include "rate_report.h"
+#include "rate_sharing.h"
 #include "stream_file.h"
 
 namespace htvm::app {
@@ -182,7 +183,15 @@ Result<void> set_skeleton(const EncodePlan& plan, const Capture& capture, Encode
 // What the sequence header says of a capture's pictures.
 Result<void> set_texture(const EncodePlan& plan, const Capture& capture, EncoderOptions& settings) {
     const auto use = plan.capture.texture_as;
-    if (!keeps_pictures(use)) return {};
+    const char* about_pictures = plan.pictures.size > 0  ? "--texture-size"
+                                 : plan.pictures.codec   ? "--texture-codec"
+                                 : plan.pictures.quality ? "--texture-quality"
+                                                         : nullptr;
+    if (!keeps_pictures(use)) {
+        if (about_pictures)
+            note(fmt::format("no pictures go into the stream, so there is nothing to do for {}", about_pictures));
+        return {};
+    }
     const auto* first = capture.first_textured();
     if (!first) return fail(ErrorKind::bad_input, "the capture's first mesh has no texture");
     const bool bake = use == TextureAs::picture;
@@ -191,7 +200,9 @@ Result<void> set_texture(const EncodePlan& plan, const Capture& capture, Encoder
     const int size = use == TextureAs::keep ? 0 : plan.pictures.size;
     constexpr long least = 16;
     if (bake) {
-        settings.texture.width = settings.texture.height = size > 0 ? size : picture_side_for(*first);
+        settings.tracked.access_interval = plan.access_interval_with_pictures;
+        settings.texture.width = settings.texture.height =
+            size > 0 ? size : picture_side_of(picture_side_for(*first), plan.encoder.quality);
         note(fmt::format("pictures have {0} x {0} pixels{1}", settings.texture.width,
                          size > 0 ? "" : "; --texture-size sets others"));
     } else {
@@ -333,6 +344,8 @@ struct Passes {
     const std::optional<AudioTrack>& audio;
     const std::vector<LoggedFrame>& efforts;  // that are repeated; empty: they are decided
     EffortLogWriter* log;                     // takes the efforts of the last pass; null: nobody asked for them
+    // Of the pictures of the next pass; nothing: as the plan says, or what a bitrate leaves them.
+    std::optional<double> picture_quality = {};
 
     bool writes(int number) const { return number >= plan.fewest_passes; }
     bool are_timed() const { return plan.is_timed || !efforts.empty(); }
@@ -366,7 +379,7 @@ Result<void> run_pass(const Passes& passes, int number, StreamOutput& output, Ou
     auto encoder = Encoder::create(passes.settings);
     if (!encoder) return tl::unexpected(encoder.error());
     if (number == 1) note_bones(passes.settings);
-    auto pictures = picture_track(plan, passes.capture, passes.settings);
+    auto pictures = picture_track(plan, passes.capture, passes.settings, passes.picture_quality);
     if (!pictures) return tl::unexpected(pictures.error());
     auto* hub = output.publishing();
     Progress progress(plan.most_passes == 1 ? "encoding" : fmt::format("pass {}", number), passes.capture.frames());
@@ -397,7 +410,7 @@ Result<void> run_pass(const Passes& passes, int number, StreamOutput& output, Ou
 // Whether another pass follows: the first ones only learn, and later ones may miss the rate.
 bool goes_on(const Passes& passes, int number, const Outcome& outcome, const StreamOutput& output) {
     if (!passes.writes(number)) return true;
-    if (number >= passes.plan.most_passes || keeps_pictures(passes.plan.capture.texture_as)) return false;
+    if (number >= passes.plan.most_passes) return false;
     return is_off(outcome.rate, 8.0 * static_cast<double>(output.bytes()),
                   seconds_of(outcome.summary, passes.capture.fps()));
 }
@@ -422,21 +435,97 @@ Result<void> conclude(const Passes& passes, const Outcome& outcome, StreamOutput
                             passes.plan.output.place, rate.dropped.size(), rate.costs.size()));
 }
 
+// How meshes and pictures share a bitrate, where several passes find it. In a single pass meshes have a fixed share,
+// and pictures what they leave.
+class SharedRate {
+public:
+    // Begins with the fixed share.
+    explicit SharedRate(Passes& passes) : passes_(passes), of_all_(passes.settings.rate.bits_per_second) {
+        passes_.settings.rate.bits_per_second *= share_of_meshes;
+    }
+    // Behind a pass: decides what the next one gives to meshes and pictures. false: there need be none.
+    bool plan_next(bool wrote, const Outcome& outcome, std::uint64_t bytes, double seconds) {
+        if (!wrote) {
+            begin(quality_range(outcome.rate).mean, seconds);
+            return true;
+        }
+        const double of_pictures = 8.0 * static_cast<double>(outcome.summary.pictures.bytes);
+        const double of_meshes = 8.0 * static_cast<double>(bytes) - of_pictures;
+        if (!passes_.picture_quality) {  // by the rate, for the sake of the buffer
+            const double of_wanted = (of_meshes + of_pictures) / sharing_->wanted_bits();
+            if (std::abs(of_wanted - 1) <= rate_tolerance) return false;
+            mesh_bits_ /= of_wanted;
+        } else {
+            const double quality = quality_range(outcome.rate).mean;
+            sharing_->add({quality, of_meshes, *passes_.picture_quality, of_pictures});
+            note(fmt::format("so shared, meshes take {:.3f} Mbit/s at quality {:.0f}, pictures {:.3f} at {:.0f}",
+                             of_meshes / seconds / 1e6, quality, of_pictures / seconds / 1e6,
+                             *passes_.picture_quality));
+            // One quality for all pictures knows nothing of a buffer, which may be too small though the rate is met.
+            constexpr double nearly = 0.1;
+            const bool overfills = outcome.rate.buffer.overflows() &&
+                                   std::abs((of_meshes + of_pictures) / sharing_->wanted_bits() - 1) < nearly;
+            if (sharing_->is_met() && !overfills) return false;
+            const auto next = sharing_->next();
+            passes_.picture_quality = next.picture_quality;
+            mesh_bits_ = next.mesh_bits;
+            constexpr double too_far = 12;  // steps of quality from those that the number of pixels is for
+            if (std::abs(next.picture_quality - quality_of_size_) > too_far) follow_with_size(next.picture_quality);
+            if (overfills) passes_.picture_quality.reset();  // a rate knows of it
+        }
+        passes_.settings.rate.bits_per_second = mesh_bits_ / seconds;
+        return true;
+    }
+    double mesh_bits() const { return mesh_bits_; }
+    bool is_finest() const { return sharing_ && sharing_->is_finest(); }
+
+private:
+    // The pictures begin at the quality that meshes have with the fixed share, and with pixels for it.
+    void begin(double quality, double seconds) {
+        sharing_.emplace(of_all_ * seconds);
+        mesh_bits_ = share_of_meshes * of_all_ * seconds;
+        passes_.picture_quality = quality;
+        usual_side_ = passes_.settings.texture.width;
+        follow_with_size(quality);
+    }
+    void follow_with_size(double quality) {
+        quality_of_size_ = quality;
+        auto& texture = passes_.settings.texture;
+        if (texture.layout == TextureLayout::charts && passes_.plan.pictures.size == 0)
+            texture.width = texture.height = picture_side_of(usual_side_, std::min(quality, 100.0));
+    }
+    Passes& passes_;
+    double of_all_, mesh_bits_ = 0, quality_of_size_ = 0;
+    int usual_side_ = 0;  // of pictures at the default quality
+    std::optional<RateSharing> sharing_ = {};
+};
+
 // One pass after another, until the bitrate is met.
 Result<void> encode_in_passes(Passes passes) {
-    // Meshes and pictures share the rate.
     const auto of_all = passes.settings;
-    if (keeps_pictures(passes.plan.capture.texture_as)) passes.settings.rate.bits_per_second *= share_of_meshes;
+    std::optional<SharedRate> shared;
+    if (keeps_pictures(passes.plan.capture.texture_as)) shared.emplace(passes);
+    const bool may_share = shared && passes.plan.most_passes > passes.plan.fewest_passes;
     std::optional<RatePasses> learned;
     for (int number = 1;; ++number) {
         // Before the first pass, so that a place that cannot be written to does not cost one.
         auto output = open_output(passes);
         if (!output) return tl::unexpected(output.error());
         Outcome outcome{{}, RateReport(of_all), Deadline(passes.plan.deadline, passes.settings.tracked.effort)};
+        outcome.rate.is_shared = may_share;
         if (auto done = run_pass(passes, number, *output, outcome); !done) return done;
-        if (!goes_on(passes, number, outcome, *output)) return conclude(passes, outcome, *output);
-        if (!learned)
-            learned.emplace(passes.settings.rate.bits_per_second * seconds_of(outcome.summary, passes.capture.fps()));
+        const double seconds = seconds_of(outcome.summary, passes.capture.fps());
+        if (!learned) learned.emplace(passes.settings.rate.bits_per_second * seconds);
+        bool again = false;
+        if (may_share) {
+            again = shared->plan_next(passes.writes(number), outcome, output->bytes(), seconds) &&
+                    number < passes.plan.most_passes;
+            outcome.rate.is_finest = shared->is_finest();
+            learned->want(shared->mesh_bits());
+        } else {
+            again = goes_on(passes, number, outcome, *output);
+        }
+        if (!again) return conclude(passes, outcome, *output);
         learned->add(std::move(outcome.rate.costs));
         passes.settings.rate.first_pass = learned->expected();
         passes.capture.rewind();
@@ -468,12 +557,14 @@ Result<void> encode(const EncodePlan& plan) {
     auto capture = Capture::open(plan.capture);
     if (!capture) return tl::unexpected(capture.error());
     if (auto may_log = check_effort_log(plan, *capture); !may_log) return may_log;
-    auto settings = settings_for(plan, *capture);
+    auto decided = plan;
+    decided.capture.texture_as = capture->texture_as();
+    auto settings = settings_for(decided, *capture);
     if (!settings) return tl::unexpected(settings.error());
     const auto audio = AudioTrack::open(plan.audio);
     if (!audio) return tl::unexpected(audio.error());
-    return plan.in_groups() ? encode_in_groups(plan, *capture, *settings, *audio)
-                            : encode_in_one(plan, *capture, std::move(*settings), *audio);
+    return plan.in_groups() ? encode_in_groups(decided, *capture, *settings, *audio)
+                            : encode_in_one(decided, *capture, std::move(*settings), *audio);
 }
 
 }  // namespace htvm::app

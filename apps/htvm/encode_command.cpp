@@ -146,8 +146,9 @@ void add_conditions(CLI::App& command) {
     // With a bitrate or a target error, quality follows from it, so options that set the steps directly contradict it.
     option("--bitrate")->excludes(option("--target-error"));
     for (const char* control : {"--bitrate", "--target-error"})
-        for (const char* by_hand : {"--quality", "--geometry-step", "--colour-step"})
+        for (const char* by_hand : {"--quality", "--preset", "--geometry-step", "--colour-step"})
             option(control)->excludes(option(by_hand));
+    option("--preset")->excludes(option("--quality"));
     option("--job")->excludes(option("--jobs"));
     for (const char* chosen : {"--deadline", "--effort"}) option("--repeat-efforts")->excludes(option(chosen));
 }
@@ -168,8 +169,8 @@ FrontPage front_page() {
              "The meshes, one file per frame (PLY, OBJ, Draco, glTF): a folder, a pattern such as\n"
              "scan_%05d.ply, files in their order, or - for PLY after PLY on standard input"},
             {"--output", "The stream: a file, - for standard output, or a hub, ws://HOST:PORT/publish/NAME"},
-            {"--quality",
-             fmt::format("0 to 100 (default {}): more looks better, and takes more bits", default_quality)},
+            {"--quality", fmt::format("0 to 100 (default {}; --preset studio: {}, master: {}): more is finer",
+                                      default_quality, quality_of(Preset::studio), quality_of(Preset::master))},
             {"--bitrate", "Mbit/s to keep to; the quality follows"},
             {"--target-error", "How far each frame's surface may be off, mm (RMS); the quality follows"},
             {"--profile",
@@ -182,8 +183,8 @@ FrontPage front_page() {
             {"--frames", "Use at most so many frames (default: all)"},
             {"--skeleton", "The tracked skeleton, if there is one: JSON or BVH"},
             {"--texture-as",
-             "What becomes of a texture: colours at the vertices (default), or a picture, which\n"
-             "is coded as video and keeps details; --help-all has the others"},
+             "What becomes of a texture: picture (default), which is coded as video and keeps\n"
+             "details, or colours at the vertices: less time, fewer bits; --help-all has the others"},
             {"--audio", "Sound that begins with the first frame"},
             {"--deadline", "Live: milliseconds that a frame may take; where time is short, less is searched"},
         },

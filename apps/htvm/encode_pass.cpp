@@ -129,9 +129,8 @@ bool is_of_dropped(const Pass& pass, const Error& error) { return is_of_rate(pas
 
 // The encoder knows only of the rate that it was given.
 std::string text_of(const Pass& pass, const Error& error) {
-    static_assert(share_of_meshes == 0.5);
     return is_of_rate(pass, error) && pass.pictures
-               ? error.message + "; this is of the meshes, which have half of --bitrate, so give twice that rate"
+               ? error.message + "; this is of the meshes, which share --bitrate with the pictures, so give more"
                : error.message;
 }
 
@@ -319,7 +318,7 @@ void FrameWarnings::tell(Kind kind, const std::string& line) {
 }
 
 Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const Capture& capture,
-                                                  const EncoderOptions& settings) {
+                                                  const EncoderOptions& settings, std::optional<double> quality) {
     const auto use = plan.capture.texture_as;
     if (!keeps_pictures(use)) return std::nullopt;
     PictureTrack::Settings out;
@@ -328,9 +327,9 @@ Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const 
     out.bake = use == TextureAs::picture;
     out.width = settings.texture.width;
     out.height = settings.texture.height;
-    out.quality = plan.encoder.quality;
+    out.quality = quality.value_or(plan.encoder.quality);
     out.frames_per_second = capture.fps();
-    if (settings.rate.bits_per_second > 0) out.bits_per_second = settings.rate.bits_per_second / share_of_meshes;
+    if (!quality) out.bits_per_second = plan.encoder.rate.bits_per_second;  // of all; the settings have the meshes'
     out.buffer_seconds = settings.rate.buffer_seconds;
     out.threads = settings.threads;
     auto track = PictureTrack::create(out);

@@ -80,9 +80,11 @@ struct Pass {
     std::shared_ptr<const TexturedMesh> last_textured = {};
 };
 
-// The pictures of a capture that keeps them, as the plan says; nothing for others.
+// The pictures of a capture that keeps them, as the plan says; nothing for others. quality: in place of the plan's, or
+// of what a bitrate leaves them.
 Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const Capture& capture,
-                                                  const EncoderOptions& settings);
+                                                  const EncoderOptions& settings,
+                                                  std::optional<double> quality = std::nullopt);
 
 // Ends with an error of any kind where it is stopped.
 Result<void> encode_frames(Pass& pass);

@@ -72,9 +72,35 @@ std::string in_encoding(const EncodeRequest& request) {
     return {};
 }
 
+// What becomes of images by default, and why not pictures, for people.
+struct OfImages {
+    TextureAs use = TextureAs::picture;
+    const char* why_no_pictures = "";
+};
+
+OfImages default_of_images(const EncodeRequest& request) {
+    constexpr auto colours = TextureAs::colours;
+    switch (request.encoding.profile) {
+        case Profile::paper:
+            return {colours, "--texture-as captured sends the images, too"};
+        case Profile::topology:
+            return {TextureAs::captured, ""};
+        case Profile::tracked:
+            break;
+    }
+    if (may_not_wait(request))
+        return {colours,
+                "frames are waited for, and drawing and coding pictures takes longer than most cameras' pace allows; "
+                "--texture-as picture does it all the same"};
+    if (request.jobs > 0 || request.job.of > 0)
+        return {colours, "pictures go through the capture in one; --chunks in place of --jobs has them"};
+    return {};
+}
+
 // What can become of a capture's images.
 std::string in_pictures(const EncodeRequest& request) {
-    const auto use = request.capture.texture_as;
+    const bool is_default = request.capture.texture_as == TextureAs::by_default;
+    const auto use = is_default ? default_of_images(request).use : request.capture.texture_as;
     const auto& pictures = request.pictures;
     const char* about_video = pictures.size > 0  ? "--texture-size"
                               : pictures.codec   ? "--texture-codec"
@@ -82,7 +108,9 @@ std::string in_pictures(const EncodeRequest& request) {
                                                  : nullptr;
     if (about_video && use != TextureAs::captured && use != TextureAs::picture)
         return refused(about_video, "is for pictures that are coded as video: add --texture-as picture or captured");
-    if (!keeps_pictures(use)) return {};
+    if (has_bitrate(request) && pictures.quality)
+        return refused("--texture-quality", "follows from --bitrate; give one of the two");
+    if (is_default || !keeps_pictures(use)) return {};
     const bool tracked = request.encoding.profile == Profile::tracked;
     const std::string word = word_of(use, texture_uses);
     if (tracked && use != TextureAs::picture)
@@ -104,8 +132,6 @@ std::string in_pictures(const EncodeRequest& request) {
         return refused("--texture-as",
                        "keep leaves image files as large as they are, which no --bitrate can change; captured codes "
                        "them as video");
-    if (has_bitrate(request) && pictures.quality)
-        return refused("--texture-quality", "follows from --bitrate; give one of the two");
     return {};
 }
 
@@ -240,10 +266,6 @@ EncoderOptions encoder_of(const EncodeRequest& request, const Destination& outpu
     if (of_files && out.tracked.group == 0 && out.tracked.effort >= least_effort_with_groups)
         out.tracked.group = largest_group(out);
     if (!given(request, "session") && request.job.of == 0 && output.may_be_live()) out.session = random_session();
-    // A key picture takes as many bits as a second of others.
-    constexpr int frames_between_key_pictures = 90;
-    if (request.capture.texture_as == TextureAs::picture && !given(request, "tracked.access_interval"))
-        out.tracked.access_interval = frames_between_key_pictures;
     return out;
 }
 
@@ -271,6 +293,9 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     if (!floor) return tl::unexpected(floor.error());
     EncodePlan plan;
     plan.capture = request.capture;
+    const auto of_images = default_of_images(request);
+    plan.capture.of_images = of_images.use;
+    plan.capture.why_no_pictures = of_images.why_no_pictures;
     plan.capture.keeps_idle_texcoords = request.encoding.profile != Profile::tracked;
     plan.capture.while_busy = request.drop_late      ? WhileBusy::drop
                               : request.deadline > 0 ? WhileBusy::read_on
@@ -281,6 +306,10 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     plan.audio = request.audio;
     plan.pictures = request.pictures;
     plan.encoder = encoder_of(request, plan.output);
+    // A key picture takes as many bits as a second of others.
+    constexpr int frames_between_key_pictures = 90;
+    plan.access_interval_with_pictures =
+        given(request, "tracked.access_interval") ? plan.encoder.tracked.access_interval : frames_between_key_pictures;
     plan.floor = *floor;
     plan.front = request.encoding.front;
     plan.radii_file = request.encoding.radii_file;

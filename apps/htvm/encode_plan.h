@@ -74,14 +74,15 @@ struct Floor {
 };
 
 struct EncodePlan {
-    CaptureOptions capture;
-    bool is_piped = false;  // the capture comes on standard input
+    CaptureOptions capture;  // texture_as: what was asked for, until the capture is open and decides it
+    bool is_piped = false;   // the capture comes on standard input
     Destination output;
     PublishingOptions publishing;  // where the output is a hub
     AudioOptions audio;
     TexturePictureOptions pictures;  // where the capture's images go into the stream
 
     EncoderOptions encoder;  // all but what the capture says: its rate, unit, axes, skeleton, radii, texture
+    int access_interval_with_pictures = 0;  // frames, in place of the encoder's, where pictures are drawn anew
     Floor floor;
     std::optional<double> front;  // degrees around the axis that is up; none: not known
     std::string radii_file;       // empty: none

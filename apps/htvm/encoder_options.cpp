@@ -25,6 +25,12 @@ constexpr std::array intra_coders = {
     Choice<IntraCoder>{"draco", IntraCoder::draco},
 };
 
+constexpr std::array presets = {
+    Choice<Preset>{"web", Preset::web},
+    Choice<Preset>{"studio", Preset::studio},
+    Choice<Preset>{"master", Preset::master},
+};
+
 bool is(const Option& option, std::string_view name) { return option.name == name; }
 
 // Under which heading the help lists an option.
@@ -126,6 +132,12 @@ void add_quality(CLI::App& command, EncodingOptions& options) {
         ->check(CLI::Range(0.0, 100.0))
         ->type_name("NUMBER")
         ->group(heading::quality);
+    add_choice(command, "--preset", options.preset, presets,
+               "A quality by what the stream is for: web, to watch on pages and phones, -q 42, the default; studio, "
+               "to look at closely, -q 65; master, to keep, and to make others of, -q 85. Meshes and pictures get "
+               "finer together")
+        ->type_name("WORD")
+        ->group(heading::quality);
     add_choice(command, "--profile", options.profile, profiles,
                "What the stream keeps. tracked (default): the fewest bits. Each frame is the last "
                "I-frame's mesh laid on the "
@@ -223,9 +235,21 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
     add_scene_options(command, options);
 }
 
+double quality_of(Preset preset) {
+    switch (preset) {
+        case Preset::web:
+            return default_quality;
+        case Preset::studio:
+            return 65;
+        case Preset::master:
+            return 85;
+    }
+    return default_quality;
+}
+
 EncoderOptions encoder_options(const EncodingOptions& options) {
     auto out = default_options(options.profile);
-    out.quality = options.quality;
+    out.quality = options.preset ? quality_of(*options.preset) : options.quality;
     for (const auto& [option, value] : options.given) option->set(out, value);
     return out;
 }

@@ -18,8 +18,13 @@ namespace htvm::app {
 
 enum class IntraCoder : std::uint8_t { tfan, draco };
 
+// Places on the one scale of quality, by what a stream is for.
+enum class Preset : std::uint8_t { web, studio, master };
+double quality_of(Preset preset);
+
 struct EncodingOptions {
     double quality = default_quality;
+    std::optional<Preset> preset;  // gives the quality
     Profile profile = Profile::tracked;
     IntraCoder intra = IntraCoder::tfan;
     std::string radii_file;               // empty: none

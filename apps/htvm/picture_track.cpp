@@ -10,6 +10,7 @@
 
 #include "command_line/headings.h"
 #include "htvm/decoder.hpp"
+#include "htvm/encoder_options.hpp"
 
 namespace htvm::app {
 namespace {
@@ -43,7 +44,7 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
         .add_option(
             "--texture-size", options.size,
             "Pixels of the pictures' longer side (default: that of the capture's images; with --texture-as picture "
-            "more if meshes show much of these)")
+            "more if meshes show much of these, and by the quality: the finer it is, the more)")
         ->check(CLI::Range(16, static_cast<int>(most_picture_side)))
         ->type_name("NUMBER")
         ->group(heading::textures);
@@ -61,6 +62,13 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
 int quantiser_of(PictureCoder coder, double quality) {
     const double offset = coder == PictureCoder::vp9 ? -4 : 0;  // the same number is coarser
     return static_cast<int>(std::clamp(std::lround(73 - 0.55 * quality + offset), 1L, 63L));
+}
+
+int picture_side_of(int usual_side, double quality) {
+    constexpr double doubles_in = 58;         // steps of quality: twice the usual side at 100
+    constexpr double step = 64, least = 256;  // below, charts of a person may find no room
+    const double side = usual_side * std::exp2((quality - default_quality) / doubles_in);
+    return static_cast<int>(std::clamp(step * std::round(side / step), least, static_cast<double>(most_picture_side)));
 }
 
 Result<PictureTrack> PictureTrack::create(const Settings& settings) {

@@ -25,7 +25,7 @@ class App;
 namespace htvm::app {
 
 struct TexturePictureOptions {
-    int size = 0;                       // pixels of the longer side; 0: as captured
+    int size = 0;                       // pixels of the longer side; 0: as captured, and drawn anew by the quality
     std::optional<PictureCoder> codec;  // av1 or vp9; not given: av1
     std::optional<double> quality;      // 0..100; not given: that of the meshes
 };
@@ -38,10 +38,19 @@ inline constexpr std::array video_codecs = {
 // Adds --texture-size, --texture-codec and --texture-quality to a command.
 void add_texture_picture_options(CLI::App& command, TexturePictureOptions& options);
 
-// The coder's quantiser for a quality at which neither meshes nor pictures spend bits that the others' errors hide.
+// ---- One scale of quality -------------------------------------------------------------------------------------------
+// At a quality neither meshes nor pictures spend bits that the others' errors hide: it says how fine positions are
+// (quality_steps()), the pictures' quantiser, and how many pixels they have. Measured: docs/experiments/
+// one_scale_of_quality.md.
+
+// The coder's quantiser.
 int quantiser_of(PictureCoder coder, double quality);
 
-// What the meshes are given of a rate for both: so their errors and those of the pictures are worth the same bits.
+// The side of pictures that are drawn anew, from that of the default quality: a multiple of 64, so that what is drawn
+// at a finer quality loses less to being drawn, and at a coarser one no bits go into pixels that nobody sees.
+int picture_side_of(int usual_side, double quality);
+
+// What the meshes are given of a rate for both, where one pass has to do.
 inline constexpr double share_of_meshes = 0.5;
 
 struct PictureTotals {
@@ -55,7 +64,7 @@ struct PictureTotals {
 class PictureTrack {
 public:
     // Pictures have one size, which images of others are brought to. With keep, files go as they are. bits_per_second:
-    // of meshes and pictures together; 0: by the quality.
+    // of meshes and pictures together; 0: by the quality, which may be above 100.
     struct Settings {
         TexturePictureOptions options;
         bool keep = false;

@@ -17,6 +17,8 @@ class RatePasses {
 public:
     // wanted_bits: of the whole stream.
     explicit RatePasses(double wanted_bits) : wanted_bits_(wanted_bits) {}
+    // What is wanted from now on, where meshes have another part of it than before.
+    void want(double bits) { wanted_bits_ = bits; }
     // What each frame took in a pass, in order; dropped ones with 0 bits.
     void add(std::vector<FrameCost> costs);
     // For RateOptions::first_pass of the next pass: each frame at a quality between those of the passes that took just

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "rate_passes.h"
+
 namespace htvm::app {
 
 // ---- The receiver's buffer ------------------------------------------------------------------------------------------
@@ -112,9 +114,14 @@ std::string rate_warning(const RateReport& report) {
 }
 
 std::string missed_rate(const RateReport& report, std::uint64_t bytes, double seconds) {
-    constexpr double most = 100.0 / 3;
+    const double most = report.is_shared ? 100 * rate_tolerance : 100.0 / 3;
     if (!report.rate_controlled() || !report.dropped.empty() || report.line_was_slower) return {};
     const double error = error_percent(report, bytes, seconds);
+    if (report.is_shared && error < -most && !report.is_finest)
+        return fmt::format(
+            "takes {:.2f} Mbit/s, {:.0f} % below its --bitrate, which its meshes and pictures did not "
+            "find how to use: give -q in its place, or a larger --buffer",
+            rate_of(bytes, seconds) / 1e6, -error);
     if (error <= most) return {};
     return fmt::format("takes {:.2f} Mbit/s, {:.0f} % above its --bitrate: give at least that, or fewer vertices",
                        rate_of(bytes, seconds) / 1e6, error);

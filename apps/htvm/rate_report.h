@@ -56,6 +56,8 @@ struct RateReport {
     std::vector<FrameCost> costs;      // one per frame of the capture, with 0 bits if it was dropped
     std::vector<std::size_t> dropped;  // indices of frames of the capture
     bool line_was_slower = false;      // so that less was made than asked for
+    bool is_shared = false;            // meshes and pictures share it over several passes, so that it is to be met
+    bool is_finest = false;            // then: both are as fine as they get
     bool moved_by_choice = false;      // P-frames are chosen where they fit, not only where nothing else does
 };
 
@@ -79,7 +81,8 @@ RateStrain rate_strain(const RateReport& report);
 // A sentence with the numbers and what helps; empty if there is no strain.
 std::string rate_warning(const RateReport& report);
 // Why the rate counts as missed: all bits are more than a third above it, as of a short capture, whose first frame the
-// buffer takes, or of one that does not get smaller. Empty: it is not missed.
+// buffer takes, or of one that does not get smaller; where it is shared, more than rate_tolerance above it or, unless
+// all is at its finest, below. Empty: it is not missed.
 std::string missed_rate(const RateReport& report, std::uint64_t bytes, double seconds);
 
 // bytes: of the stream; seconds: of the capture, including dropped frames.

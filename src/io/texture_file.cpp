@@ -209,6 +209,14 @@ std::vector<std::filesystem::path> TextureFiles::known_images() const {
     return out;
 }
 
+std::vector<std::size_t> TextureFiles::places_with_image_beside(std::size_t begin, std::size_t end,
+                                                                std::size_t most) const {
+    std::vector<std::size_t> out;
+    for (std::size_t place = begin; place < std::min(end, meshes_.paths.size()) && out.size() < most; ++place)
+        if (image_beside(meshes_.paths[place])) out.push_back(place);
+    return out;
+}
+
 bool TextureFiles::Kept::is_of(const Found& found) const {
     if (found.picture || picture) return picture == found.picture;
     return found.bytes ? bytes == *found.bytes : !path.empty() && path == found.path;

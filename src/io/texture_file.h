@@ -78,6 +78,10 @@ public:
     // The images of all meshes as far as they are known before these are read.
     std::vector<std::filesystem::path> known_images() const;
 
+    // The places of meshes from `begin` to before `end` that have an image beside them which is called like them: the
+    // first so many.
+    std::vector<std::size_t> places_with_image_beside(std::size_t begin, std::size_t end, std::size_t most) const;
+
 private:
     static Result<TextureFiles> of_recording(TextureFiles files);
     struct Found {

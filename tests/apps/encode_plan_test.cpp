@@ -82,6 +82,11 @@ TEST(Contradictions, SettingsOfVideoNeedPicturesThatAreCodedAsVideo) {
     const std::string advice = ": is for pictures that are coded as video: add --texture-as picture or captured";
     auto request = usual();
     request.pictures.size = 512;
+    EXPECT_EQ(contradiction_in(request), "");  // pictures are what images become
+    request.jobs = 2;
+    EXPECT_EQ(contradiction_in(request), "--texture-size" + advice);
+    request = with_pictures(TextureAs::colours, Profile::tracked);
+    request.pictures.size = 512;
     EXPECT_EQ(contradiction_in(request), "--texture-size" + advice);
     request = with_pictures(TextureAs::keep, Profile::topology);
     request.pictures.codec = PictureCoder::av1;
@@ -375,11 +380,68 @@ TEST(EncodePlan, ABitrateIsMetInAsManyPassesAsItTakes) {
 }
 
 TEST(EncodePlan, PicturesAreStartedAtEveryThreeSecondsUnlessTold) {
-    auto request = with_pictures(TextureAs::picture, Profile::tracked);
-    EXPECT_EQ(plan(request).encoder.tracked.access_interval, 90);
+    auto request = usual();
+    EXPECT_EQ(plan(request).access_interval_with_pictures, 90);
+    EXPECT_EQ(plan(request).encoder.tracked.access_interval, EncoderOptions().tracked.access_interval);
     give(request, "tracked.access_interval", 45);
-    EXPECT_EQ(plan(request).encoder.tracked.access_interval, 45);
-    EXPECT_EQ(plan(usual()).encoder.tracked.access_interval, EncoderOptions().tracked.access_interval);
+    EXPECT_EQ(plan(request).access_interval_with_pictures, 45);
+}
+
+TEST(EncodePlan, ImagesBecomePicturesByDefault) {
+    EXPECT_EQ(plan(usual()).capture.of_images, TextureAs::picture);
+    EXPECT_EQ(plan(piped()).capture.of_images, TextureAs::picture);
+    auto request = usual();
+    request.chunks = 2;
+    EXPECT_EQ(plan(request).capture.of_images, TextureAs::picture);
+    request = usual();
+    request.encoding.profile = Profile::topology;
+    EXPECT_EQ(plan(request).capture.of_images, TextureAs::captured);
+    EXPECT_EQ(plan(request).capture.texture_as, TextureAs::by_default);  // until there is an image
+}
+
+TEST(EncodePlan, ImagesBecomeColoursWherePicturesCannotBeAndItIsSaidWhy) {
+    const auto why = [](const EncodeRequest& request) {
+        const auto made = plan(request);
+        EXPECT_EQ(made.capture.of_images, TextureAs::colours);
+        return made.capture.why_no_pictures.substr(0, 23);
+    };
+    auto request = to_hub();
+    EXPECT_EQ(why(request), "frames are waited for, ");
+    request = piped();
+    request.deadline = 50;
+    EXPECT_EQ(why(request), "frames are waited for, ");
+    request = usual();
+    request.jobs = 2;
+    EXPECT_EQ(why(request), "pictures go through the");
+    request.jobs = 0;
+    request.job = {1, 2};
+    EXPECT_EQ(why(request), "pictures go through the");
+    request = usual();
+    request.encoding.profile = Profile::paper;
+    EXPECT_EQ(why(request), "--texture-as captured s");
+}
+
+TEST(EncodePlan, APresetIsAPlaceOnTheOneScaleOfQuality) {
+    auto request = usual();
+    for (const auto& [preset, quality] :
+         {std::pair(Preset::web, default_quality), std::pair(Preset::studio, 65.0), std::pair(Preset::master, 85.0)}) {
+        request.encoding.preset = preset;
+        EXPECT_EQ(plan(request).encoder.quality, quality);
+    }
+}
+
+TEST(EncodePlan, PicturesGetFinerAndLargerWithTheQuality) {
+    EXPECT_EQ(picture_side_of(1088, default_quality), 1088);
+    EXPECT_EQ(picture_side_of(1024, 100), 2048);
+    EXPECT_EQ(picture_side_of(4096, 100), 4096);  // the most there is
+    int side = 0, quantiser = 64;
+    for (double quality = 20; quality <= 100; quality += 10) {
+        EXPECT_GT(picture_side_of(1024, quality), side);
+        EXPECT_LT(quantiser_of(PictureCoder::av1, quality), quantiser);
+        side = picture_side_of(1024, quality);
+        quantiser = quantiser_of(PictureCoder::av1, quality);
+        EXPECT_EQ(side % 64, 0);
+    }
 }
 
 TEST(EncodePlan, ACameraIsReadAtItsPace) {

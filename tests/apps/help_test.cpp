@@ -140,8 +140,9 @@ TEST(HelpAll, HasEveryOptionOfTheLibrarysList) {
 TEST(HelpAll, SortsOptionsByWhatTheyAreFor) {
     const auto all = help("encode", "--help-all");
     EXPECT_THAT(flags_under(all, "Input"), testing::IsSupersetOf({"--fps", "--unit", "--frames", "--on-bad-frame"}));
-    EXPECT_THAT(flags_under(all, "Quality and rate"),
-                testing::IsSupersetOf({"--quality", "--bitrate", "--target-error", "--effort", "--profile"}));
+    EXPECT_THAT(
+        flags_under(all, "Quality and rate"),
+        testing::IsSupersetOf({"--quality", "--preset", "--bitrate", "--target-error", "--effort", "--profile"}));
     EXPECT_THAT(flags_under(all, "Textures"),
                 testing::UnorderedElementsAre("--texture", "--texture-origin", "--texture-as", "--texture-size",
                                               "--texture-codec", "--texture-quality"));
@@ -195,6 +196,9 @@ TEST(CommandLine, AContradictionIsAUsageErrorThatNamesTheOption) {
     ends_with({"encode", "capture", "-o", "x.htvm", "--profile", "best"},
               "--profile: best is none of tracked, topology, paper; 'htvm encode --help-all' tells more");
     ends_with({"encode", "capture", "-o", "x.htvm", "--bitrate", "4", "-q", "50"}, "--quality excludes --bitrate");
+    ends_with({"encode", "capture", "-o", "x.htvm", "--preset", "web", "-q", "50"}, "--quality excludes --preset");
+    ends_with({"encode", "capture", "-o", "x.htvm", "--preset", "web", "--bitrate", "4"},
+              "--preset excludes --bitrate");
     ends_with({"encode", "capture", "-o", "x.htvm", "--passes", "2"}, "--passes requires --bitrate");
     ends_with({"publish", "-", "ws://localhost:1/publish/a", "--loop"}, "--loop: begins again, which standard input");
     ends_with({"publish", "ws://localhost:1/publish/a", "ws://localhost:1/publish/a"},

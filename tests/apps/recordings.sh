@@ -18,7 +18,7 @@ json.dump({"frames": frames, "average_fps": "15"}, open("scandy/scvv_animation.j
 PYTHON
 expect 0 "scandy: SCVV (Scandy), 3 frames" "$htvm" encode scandy --unit mm -o x.htvm
 [ "$(times x.htvm 1000)" = "0 100 150 " ] || fail "frames of SCVV are at $(times x.htvm 1000)ms"
-expect 0 "the colours are those of the texture" "$htvm" encode scandy --unit mm -o x.htvm
+expect 0 "is drawn anew in a layout that lasts" "$htvm" encode scandy --unit mm -o x.htvm
 expect 0 "M2" "$htvm" compare scandy x.htvm --unit mm --only m2
 expect 0 "nothing to mend was found" "$htvm" check scandy --unit mm
 rm scandy/00001.obj

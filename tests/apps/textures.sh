@@ -12,9 +12,20 @@ grep -q '"gain"' truth/truth.json || fail "the truth does not tell the exposure"
 expect 2 "writes images beside meshes in a folder, so not with --live" "$htvm" synth --live --texture 256
 expect 1 "64 to 4096 pixels" "$htvm" synth x --frames 1 --texture 5000
 
-# Colours at vertices by default; the stream has no texture coordinates.
+# Pictures by default, with a line that says so and how to have it otherwise.
+expect 0 "the texture (capture/frame_00000.jpg, 256 x 256 pixels) is drawn anew in a layout that lasts, and coded as video; --texture-as colours has its colours" \
+    "$htvm" encode capture -o pictures.htvm
+expect 0 "3 pictures" "$htvm" info pictures.htvm
+expect 0 "pictures have 512 x 512 pixels" "$htvm" encode capture -q 100 -o fine.htvm
+expect 0 "the texture (capture/frame_00000.jpg, 256 x 256 pixels) is coded as video, with its coordinates as captured" \
+    "$htvm" encode capture --profile topology -o captured.htvm
+# Where there are none, their options do nothing.
+expect 0 "no pictures go into the stream, so there is nothing to do for --texture-size" \
+    "$htvm" encode capture --texture none --texture-size 64 -o none.htvm
+
+# Colours at vertices where they are asked for; the stream has no texture coordinates.
 expect 0 "the colours are those of the texture (capture/frame_00000.jpg, 256 x 256 pixels) at the vertices" \
-    "$htvm" encode capture -o colours.htvm
+    "$htvm" encode capture --texture-as colours -o colours.htvm
 "$htvm" decode colours.htvm -o decoded/ --quiet
 head -c 400 decoded/00000.ply | grep -qa "property uchar red" || fail "the decoded mesh has no colours"
 head -c 400 decoded/00000.ply | grep -qa "property float s" && fail "the decoded mesh has texture coordinates"
@@ -26,16 +37,21 @@ textured=$(unlit capture colours.htvm)
 expect 0 "the texture coordinates are encoded, their image (capture/frame_00000.jpg) is not" \
     "$htvm" encode capture --texture-as coordinates -o coordinates.htvm
 [ "$(unlit capture coordinates.htvm)" -gt "$textured" ] || fail "kept coordinates do not show the image"
+[ "$(unlit capture pictures.htvm)" -ge "$textured" ] || fail "pictures are worse than colours"
 
-# Two processes give the same stream.
-"$htvm" encode capture --keyint 1 --jobs 2 -o jobs.htvm --quiet
+# Two processes give the same stream, of colours, which is said.
+expect 0 "without its details: pictures go through the capture in one; --chunks in place of --jobs has them" \
+    "$htvm" encode capture --keyint 1 --jobs 2 -o jobs.htvm
 "$htvm" encode capture --keyint 1 --jobs 1 -o job.htvm --quiet
 cmp -s jobs.htvm job.htvm || fail "jobs make another stream"
 
 # Standard input: an image by its comment, and one for all.
 (cd capture && cat frame_0000*.ply | "$htvm" encode - -o ../piped.htvm --quiet)
-"$htvm" decode piped.htvm -o piped/ --quiet
-head -c 400 piped/00000.ply | grep -qa "property uchar red" || fail "meshes from standard input have no colours"
+expect 0 "3 pictures" "$htvm" info piped.htvm
+expect 0 "without its details: frames are waited for" \
+    bash -c "cd capture && cat frame_0000*.ply | '$htvm' encode - --deadline 1000 -o ../timed.htvm"
+"$htvm" decode timed.htvm -o timed/ --quiet
+head -c 400 timed/00000.ply | grep -qa "property uchar red" || fail "meshes that are waited for have no colours"
 expect 1 "take one image for all" bash -c "cat capture/*.ply | '$htvm' encode - --texture 'capture/frame_%05d.jpg' -o x.htvm"
 
 # Pictures: a square metre whose upper half is white, the lower black, as its material says; and turned over.
@@ -69,6 +85,16 @@ expect 0 "1 bad frame left out" "$htvm" encode some --on-bad-frame skip -o x.htv
 # Of the first frame it is no less: the others say what the capture is like.
 mv some/a_1.png some/a_2.png
 expect 1 "some/a_1.obj: there is no image for it, as there is for others" "$htvm" encode some -o x.htvm
+expect 0 "some/a_1.obj: there is no image for it, as there is for others; --texture gives its place, --texture-as coordinates does without images; it is left out" \
+    "$htvm" encode some --on-bad-frame skip -o x.htvm
+# Wherever images lie: these are named in the files, in a folder of their own, and the first 20 frames have none.
+mkdir -p many/img && cp skin.png many/img/skin.png
+{ printf 'mtllib square.mtl\n'; grep '^[uvf]' square.obj; } >named.obj
+printf 'newmtl skin\nmap_Kd img/skin.png\n' >many/square.mtl
+for k in $(seq 10 39); do if [ "$k" -lt 30 ]; then grep '^[vf]' square.obj; else cat named.obj; fi >many/b_$k.obj; done
+expect 1 "many/b_10.obj: there is no image for it, as there is for others" "$htvm" encode many -o x.htvm
+expect 0 "20 bad frames left out" "$htvm" encode many --on-bad-frame skip -o x.htvm
+expect 0 "10 pictures" "$htvm" info x.htvm
 expect 1 "bad          some/a_1.obj: there is no image for it" "$htvm" check some
 expect 1 "1 frame cannot be encoded: mend them" "$htvm" check some
 expect 1 "x.htvm is a stream, whose texture is inside" "$htvm" still x.htvm --texture skin.png -o x.png
@@ -91,7 +117,7 @@ if command -v ffmpeg >/dev/null; then
     "$htvm" synth walk --frames 9 --vertices 300 --texture 64 --texture-format png --quiet
     mkdir meshes && cp walk/*.ply meshes
     ffmpeg -v error -i walk/frame_%05d.png -c:v libx264rgb -crf 0 clip.mp4
-    for options in "" "--first 3 --frames 4" "--keyint 3 --jobs 2" "--bitrate 1" "--texture-as picture" \
+    for options in "" "--first 3 --frames 4" "--keyint 3 --jobs 2" "--bitrate 1" "--texture-as colours" \
         "--profile topology --texture-as captured"; do
         "$htvm" encode walk $options -o images.htvm --quiet
         "$htvm" encode meshes --texture clip.mp4 $options -o video.htvm --quiet || fail "a video with '$options'"
