@@ -92,7 +92,7 @@ void StreamSampler::add_frame(const Packet& packet) {
     auto& mesh = sample_->tracks[0][0];
     if (!mesh_entry_) mesh_entry_ = place_of(entries_.meshes, {});
     mesh.entry = mesh_entry_.value_or(0);
-    mesh.time = static_cast<std::int64_t>(time_.microseconds());
+    mesh.time = static_cast<std::int64_t>(std::min(time_.microseconds(), longest_us));
     frame_timestamp_us_ = packet.timestamp_us;
     if (header_with_flags(packet).has(packet_flag::access)) closure_ = numbers_.dependencies().closure();
 }
@@ -138,7 +138,8 @@ bool StreamSampler::add_sound(const Packet& packet, std::span<const std::uint8_t
     constexpr std::int64_t farthest_us = std::int64_t{1} << 40;
     const auto behind = static_cast<double>(packet.timestamp_us) - static_cast<double>(frame_timestamp_us_);
     if (behind < -static_cast<double>(farthest_us) || behind > static_cast<double>(farthest_us)) return false;
-    const auto begin_us = static_cast<std::int64_t>(time_.microseconds()) + (packet.timestamp_us - frame_timestamp_us_);
+    const auto begin_us = static_cast<std::int64_t>(std::min(time_.microseconds(), longest_us)) +
+                          (packet.timestamp_us - frame_timestamp_us_);
     auto time = begin_us * 48 / 1000;
     constexpr std::int64_t rounded = audio_samples_per_second / 1000;
     if (sound_end_ && time < *sound_end_ + rounded) time = *sound_end_;
@@ -195,7 +196,7 @@ std::optional<StreamSample> StreamSampler::finish() {
     if (!sample_) return std::nullopt;
     // Packets behind the last frame that go with a next one: a sample of no duration.
     if (!has_frame_) {
-        sample_->tracks[0][0].time = static_cast<std::int64_t>(time_.total_us());
+        sample_->tracks[0][0].time = static_cast<std::int64_t>(total_us());
         sample_->tracks[0][0].entry = mesh_entry_.value_or(0);
         if (entries_.meshes.empty()) entries_.meshes.emplace_back();
     }

@@ -1,6 +1,7 @@
 // A stream's packets as samples of the tracks of an .mp4 (docs/mp4.md): meshes, pictures, sound.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -70,6 +71,9 @@ struct TrackEntries {
     std::vector<SoundEntry> sound;
 };
 
+// Timestamps may be anything: later times than this, which is 35 years, are this one.
+inline constexpr std::uint64_t longest_us = std::uint64_t{1} << 50;
+
 class StreamSampler {
 public:
     // Takes every packet of a stream, in order. Gives out the frame before, when the next one begins. The index in
@@ -78,7 +82,7 @@ public:
     // The last one.
     std::optional<StreamSample> finish();
     const TrackEntries& entries() const { return entries_; }
-    std::uint64_t total_us() const { return time_.total_us(); }
+    std::uint64_t total_us() const { return std::min(time_.total_us(), longest_us); }
 
 private:
     struct Stored {
