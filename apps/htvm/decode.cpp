@@ -353,7 +353,8 @@ Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error)
     return {};
 }
 
-// What a hub has for who joins comes at once; from the first packet on that is waited for, frames come as they are made.
+// What a hub has for who joins comes at once; from the first packet on that is waited for, frames come as they are
+// made.
 std::optional<Packet> next_packet(Decoding& d) {
     constexpr std::chrono::milliseconds at_once{8};
     const auto begin = std::chrono::steady_clock::now();

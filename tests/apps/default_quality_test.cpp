@@ -51,8 +51,8 @@ std::vector<Bytes> by_program(const std::vector<Mesh>& meshes) {
     fs::create_directories(folder / "capture");
     for (std::size_t i = 0; i < meshes.size(); ++i)
         EXPECT_TRUE(write_mesh(folder / "capture" / (std::to_string(i) + ".ply"), meshes[i]));
-    std::array<std::string, 8> words = {"htvm", "encode", folder / "capture",     "--unit",
-                                        "mm",   "-o",     folder / "stream.htvm", "--quiet"};
+    std::array<std::string, 10> words = {"htvm", "encode", folder / "capture",     "--unit", "mm", "--group",
+                                         "1",    "-o",     folder / "stream.htvm", "--quiet"};
     std::vector<char*> arguments;
     for (auto& word : words) arguments.push_back(word.data());
     Program program{"htvm", "", "", {add_encode}, {}};
@@ -65,7 +65,7 @@ std::vector<Bytes> by_program(const std::vector<Mesh>& meshes) {
     return out;
 }
 
-TEST(DefaultQuality, TheLibraryMakesTheStreamOfTheCommandLine) {
+TEST(DefaultQuality, TheLibraryMakesTheStreamOfTheCommandLineWithoutGroups) {
     const auto meshes = capture();
     const auto library = by_library(meshes);
     EXPECT_GE(library.size(), std::size_t{1 + frames});

@@ -57,9 +57,9 @@ inline Packet sound_packet(std::uint32_t frame, std::int64_t timestamp_us, std::
     return write_audio(audio, frame, timestamp_us);
 }
 
-// 12 frames at 30 a second, with the sequence header again before frame 6 and sound between the two: I-frames 0 and 6, a TP-frame 3, T-frames that follow each other; decoding can start at 0,
-// 3, 5, which needs 3, 6 and 9. With pictures, key pictures of which are at 0 and 6, and sound from 6.5 ms before frame
-// 0.
+// 12 frames at 30 a second, with the sequence header again before frame 6 and sound between the two: I-frames 0 and 6,
+// a TP-frame 3, T-frames that follow each other; decoding can start at 0, 3, 5, which needs 3, 6 and 9. With pictures,
+// key pictures of which are at 0 and 6, and sound from 6.5 ms before frame 0.
 inline std::vector<Packet> stream_with_all() {
     using enum PacketKind;
     using namespace packet_flag;

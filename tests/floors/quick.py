@@ -17,7 +17,7 @@ import sys
 import time
 
 # The test programs from the bottom: tests/NAME/*.cpp are the program test_NAME.
-PROGRAMS = ["core", "entropy", "surface", "codec", "c_api", "memory", "io", "sound", "texture", "synth", "metrics",
+PROGRAMS = ["core", "entropy", "surface", "codec", "c_api", "memory", "io", "sound", "container", "texture", "synth", "metrics",
             "live", "apps", "lab"]
 
 # What a changed file begins with, and who tests it: its own floor's program and the next ones above that would fail

@@ -64,7 +64,7 @@ offers() {
     [ "$offered" = "$1" ] || fail "bash offers '$offered' for '$2', not '$1'"
     checks=$((checks + 1))
 }
-offers 'calibrate|check|compare|cut|decode|demo|encode|help|index|info|join|link|play|publish|render|serve|still|synth|verify' 'htvm '
+offers 'calibrate|check|compare|cut|decode|demo|encode|help|index|info|join|link|pack|play|publish|render|serve|still|synth|verify' 'htvm '
 offers 'decode' 'htvm dec'
 offers '--help|--version' 'htvm --'
 offers 'paper|topology|tracked' 'htvm encode capture --profile '

@@ -261,9 +261,9 @@ constexpr Option list[] = {
      .unit = "frames",
      .least = 1,
      .most = 8,
-     .zero =
-         "by the effort: up to 5 each frame alone, at 6, 7, 8 and above groups of 2, 4 and 8, where groups may be; htvm "
-         "encode takes 8 for files from effort 3 on",
+     .zero = "by the effort: up to 5 each frame alone, at 6, 7, 8 and above groups of 2, 4 and 8, where groups may be; "
+             "htvm "
+             "encode takes 8 for files from effort 3 on",
      .meaning =
          "T-frames that are coded as a group, the last one first, the others from two around them each: fewer bits "
          "for files; packets come up to so many frames late, and encoding takes longer",
