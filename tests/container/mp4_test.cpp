@@ -186,8 +186,8 @@ TEST(Mp4, without_its_sound_is_the_stream_without_sound) {
 TEST(Mp4, of_which_a_picture_is_damaged_lacks_that_picture_alone_and_says_so) {
     const auto stream = stream_with_all();
     auto mp4 = *mp4_of(stream);
-    const auto& sample = tables_of(mp4)[pictures].samples[4];
-    mp4[sample.offset + 3] ^= 1;
+    const auto place = tables_of(mp4)[pictures].samples[4].offset;
+    mp4[place + 3] ^= 1;
     auto expected = stream;
     std::erase_if(expected, [](const Packet& p) { return p.kind == PacketKind::texture && p.frame == 4; });
     const auto back = unpacked(mp4);
