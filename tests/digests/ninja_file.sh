@@ -45,7 +45,7 @@ tool=tests/digests/digests.cpp
 build gcc-O0 g++ "-O0" "-pthread" "${decoder[@]}" $tool
 build gcc-O3-native g++ "-O3 -march=native" "-pthread" "${decoder[@]}" $tool
 build clang-O2 clang++ "-O2" "-pthread" "${decoder[@]}" $tool
-build gcc-O2-32bit g++ "-O2 -m32 -msse2 -mfpmath=sse" "-m32 -pthread" "${decoder[@]}" $tool
+build gcc-O2-32bit g++ "-O2 -m32 -idirafter /usr/include/x86_64-linux-gnu -msse2 -mfpmath=sse" "-m32 -pthread" "${decoder[@]}" $tool
 build wasm-O2 clang++ "$wasi -O2" "--target=wasm32-wasi -Wl,--strip-all" "${decoder[@]}" src/c_api/wasm_traps.cpp $tool
 
 # The C interface: exports every function of the decoder part of htvm.h. It uses 128-bit vectors, which all browsers have,
