@@ -154,8 +154,8 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
         "What becomes of a texture: picture, drawn anew in a layout that lasts, and coded as video (with --profile\n"
         "tracked); captured, coordinates as they are and images coded as video (with --profile topology); keep,\n"
         "the same with the images' files as they are; coordinates, the same without images; or colours at the\n"
-        "vertices. Default: of encode picture, with --profile topology captured; colours with --profile paper, --jobs\n"
-        "and --job, and where frames are waited for, as with --deadline and a hub; of meshes that have vertex colours\n"
+        "vertices. Default: of encode picture; colours with --profile topology and --profile paper, with --jobs and\n"
+        "--job, and where frames are waited for, as with --deadline and a hub; of meshes that have vertex colours\n"
         "of their own these")
         ->group(heading::textures);
 }

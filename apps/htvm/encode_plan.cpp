@@ -82,9 +82,8 @@ OfImages default_of_images(const EncodeRequest& request) {
     constexpr auto colours = TextureAs::colours;
     switch (request.encoding.profile) {
         case Profile::paper:
-            return {colours, "--texture-as captured sends the images, too"};
         case Profile::topology:
-            return {TextureAs::captured, ""};
+            return {colours, "--texture-as captured sends the images, too"};
         case Profile::tracked:
             break;
     }

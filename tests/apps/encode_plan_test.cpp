@@ -395,7 +395,7 @@ TEST(EncodePlan, ImagesBecomePicturesByDefault) {
     EXPECT_EQ(plan(request).capture.of_images, TextureAs::picture);
     request = usual();
     request.encoding.profile = Profile::topology;
-    EXPECT_EQ(plan(request).capture.of_images, TextureAs::captured);
+    EXPECT_EQ(plan(request).capture.of_images, TextureAs::colours);
     EXPECT_EQ(plan(request).capture.texture_as, TextureAs::by_default);  // until there is an image
 }
 

@@ -17,7 +17,7 @@ expect 0 "the texture (capture/frame_00000.jpg, 256 x 256 pixels) is drawn anew 
     "$htvm" encode capture -o pictures.htvm
 expect 0 "3 pictures" "$htvm" info pictures.htvm
 expect 0 "pictures have 512 x 512 pixels" "$htvm" encode capture -q 100 -o fine.htvm
-expect 0 "the texture (capture/frame_00000.jpg, 256 x 256 pixels) is coded as video, with its coordinates as captured" \
+expect 0 "at the vertices, without its details: --texture-as captured sends the images, too" \
     "$htvm" encode capture --profile topology -o captured.htvm
 # Where there are none, their options do nothing.
 expect 0 "no pictures go into the stream, so there is nothing to do for --texture-size" \
