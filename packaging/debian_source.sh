@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 version=$(sed -n '1s/^htvm (\(.*\)-[0-9]*).*/\1/p' packaging/debian/changelog)
 rm -rf "$out/htvm-$version"
 git archive --prefix="htvm-$version/" HEAD | tar x -C "$out"
-# Of the same bytes whenever it is made.
+# It has the same bytes whenever it is made.
 stamp=$(git log -1 --format=%ct)
 tar c --sort=name --mtime="@$stamp" --owner=0 --group=0 --numeric-owner -C "$out" "htvm-$version" |
     gzip -9n >"$out/htvm_$version.orig.tar.gz"

@@ -344,7 +344,7 @@ struct Passes {
     const std::optional<AudioTrack>& audio;
     const std::vector<LoggedFrame>& efforts;  // that are repeated; empty: they are decided
     EffortLogWriter* log;                     // takes the efforts of the last pass; null: nobody asked for them
-    // Of the pictures of the next pass; nothing: as the plan says, or what a bitrate leaves them.
+    // The quality of the next pass's pictures; nothing: as the plan says, or what a bitrate leaves them.
     std::optional<double> picture_quality = {};
 
     bool writes(int number) const { return number >= plan.fewest_passes; }

@@ -264,7 +264,7 @@ Result<StreamOutput> StreamOutput::open(const std::string& path, const Publishin
     if (const auto what = other_kind_of(path); !what.empty())
         return fail(ErrorKind::bad_input, path + " is the name of " + what +
                                               ", but a stream would be written there; give one that ends in .htvm");
-    // Of which another file is made at the end.
+    // Another file is made of these at the end.
     std::string packets = path;
     constexpr const char* packets_beside = ".htvm";
     if (internal::lower_case(std::filesystem::path(path).extension().string()) == ".mp4") {

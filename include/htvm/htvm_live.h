@@ -20,7 +20,7 @@
  *       if (status == HTVM_OK) htvm_decoder_send_bytes(decoder, bytes, count);        then receive frames
  *   htvm_watcher_destroy(watcher);
  *
- * Threads. Each handle has a thread of its own that reads and writes the line. Of the caller's threads one at a time
+ * Threads. Each handle has a thread of its own that reads and writes the line. One at a time of the caller's threads
  * may use a handle, but for htvm_watcher_stop(), which any may call at any time until _destroy is called; different
  * threads may use different handles at the same time. No function calls the caller back.
  *

@@ -10,8 +10,8 @@
 // arrive can be decoded. A lost line or a restarted hub ends nothing: the publisher connects again, to the next of the
 // hubs that it knows, and goes on with what the newest frame needs.
 //
-// Threads and lifetimes. It has a thread of its own, which reads and writes the line, and ends with it. Of the caller's
-// threads one at a time may use it, but for state() and wants_key_frame(), which any may call at any time. Packets that
+// Threads and lifetimes. It has a thread of its own, which reads and writes the line, and ends with it. One at a time
+// of the caller's threads may use it, but for state() and wants_key_frame(), which any may call at any time. Packets that
 // it is given are copied.
 #pragma once
 

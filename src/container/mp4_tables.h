@@ -31,7 +31,7 @@ struct Mp4Sample {
 struct Mp4Track {
     SampleTrack kind = SampleTrack::meshes;
     std::uint32_t clock = 1;  // ticks a second
-    // Of meshes: the packets in the record of the configuration, for each sample entry.
+    // A track of meshes has the packets in the record of the configuration, for each sample entry.
     std::vector<std::vector<std::uint8_t>> configurations;
     std::vector<Mp4Sample> samples;  // each within the file
 };

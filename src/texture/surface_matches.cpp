@@ -125,7 +125,7 @@ private:
     double reach_;
 };
 
-// Of each captured vertex the first at the same place: captures repeat vertices at the seams of their textures.
+// For each captured vertex the first at the same place: captures repeat vertices at the seams of their textures.
 std::vector<std::uint32_t> first_at_place(std::span<const Vector3f> positions) {
     std::vector<std::uint32_t> order(positions.size()), out(positions.size());
     std::iota(order.begin(), order.end(), 0u);

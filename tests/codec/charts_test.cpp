@@ -239,7 +239,7 @@ TEST(Charts, ThereIsMoreToSeeWhereCapturedColoursChange) {
     const auto detail = captured_detail(at, captured);
     ASSERT_EQ(detail.size(), 2u);
     EXPECT_EQ(detail[0], 0);
-    // Of the edges at a vertex, those across change by 50 levels: along x within 10 units, aslant within 14.
+    // Those edges at a vertex that lie across change by 50 levels: along x within 10 units, aslant within 14.
     EXPECT_NEAR(static_cast<double>(detail[1]), 50 * 2 / (10 + 10 + 14.14), 0.3);
 }
 

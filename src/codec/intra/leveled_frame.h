@@ -41,7 +41,7 @@ struct LevelShare {
     std::size_t colour_bytes = 0;  // of the mesh that frames refer to, with the level that this is; of each below it
     bool referred = false;         // whether frames refer to it and those above
 };
-// Of an I-frame that has levels; nothing where it has none. Errors: as decode_leveled_frame().
+// The shares of an I-frame's levels; nothing where it has none. Errors: as decode_leveled_frame().
 Result<std::vector<LevelShare>> level_shares(const FramePayloadView& payload, std::size_t most_vertices);
 
 // most_vertices: of the mesh with all its detail. Errors: corrupt_stream, limit.
