@@ -11,8 +11,8 @@
 // hubs that it knows, and goes on with what the newest frame needs.
 //
 // Threads and lifetimes. It has a thread of its own, which reads and writes the line, and ends with it. One at a time
-// of the caller's threads may use it, but for state() and wants_key_frame(), which any may call at any time. Packets that
-// it is given are copied.
+// of the caller's threads may use it, but for state() and wants_key_frame(), which any may call at any time. Packets
+// that it is given are copied.
 #pragma once
 
 #include <chrono>

@@ -33,8 +33,8 @@ struct MatchedSurface {
     std::span<const std::array<std::uint32_t, 3>> beside;  // the triangle across each edge, from corner i to i + 1
 };
 
-// Triangles across each edge; SurfaceMatch::nothing where there is none. Where more than two are at an edge, the first two are
-// beside each other, and the next two.
+// Triangles across each edge; SurfaceMatch::nothing where there is none. Where more than two are at an edge, the first
+// two are beside each other, and the next two.
 std::vector<std::array<std::uint32_t, 3>> triangles_beside(std::span<const Triangle> triangles);
 
 // One for each captured vertex; nothing where none lies within reach. All numbers must be in range, positions finite.
