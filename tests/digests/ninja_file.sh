@@ -44,9 +44,9 @@ mapfile -t decoder < <(sources)
 tool=tests/digests/digests.cpp
 build gcc-O0 g++ "-O0" "-pthread" "${decoder[@]}" $tool
 build gcc-O3-native g++ "-O3 -march=native" "-pthread" "${decoder[@]}" $tool
-build clang-O2 clang++ "-O2" "-pthread" "${decoder[@]}" $tool
+build clang-O2 clang++-14 "-O2" "-pthread" "${decoder[@]}" $tool
 build gcc-O2-32bit g++ "-O2 -m32 -idirafter /usr/include/x86_64-linux-gnu -msse2 -mfpmath=sse" "-m32 -pthread" "${decoder[@]}" $tool
-build wasm-O2 clang++ "$wasi -O2" "--target=wasm32-wasi -Wl,--strip-all" "${decoder[@]}" src/c_api/wasm_traps.cpp $tool
+build wasm-O2 clang++-14 "$wasi -O2" "--target=wasm32-wasi -Wl,--strip-all" "${decoder[@]}" src/c_api/wasm_traps.cpp $tool
 
 # The C interface: exports every function of the decoder part of htvm.h. It uses 128-bit vectors, which all browsers have,
 # imports nothing, and its memory cannot grow beyond 512 MB.
@@ -56,11 +56,11 @@ for source in "${decoder[@]}" src/c_api/wasm_traps.cpp src/c_api/wasm_no_system.
     src/c_api/c_decoder.cpp src/c_api/c_dependency.cpp; do
     object=$out/wasm-browser/${source//\//_}.o
     objects+=" $object"
-    printf 'build %s: compile %s\n  compiler = clang++\n  flags = %s\n' "$object" "$source" "$browser"
+    printf 'build %s: compile %s\n  compiler = clang++-14\n  flags = %s\n' "$object" "$source" "$browser"
 done
 functions='decoder_[a-z_]+|packet_read|dependencies_[a-z]+|frame_kind_[a-z]+|frame_reason_name|layer_name|index_read|version|version_string|stream_version|status_text'
 exports=$(grep -oE "\bhtvm_($functions) ?\(" include/htvm/htvm.h |
     tr -d ' (' | sort -u | sed 's/^/-Wl,--export=/' | tr '\n' ' ')
-printf 'build build/wasm/htvm_decoder.wasm: link%s\n  compiler = clang++\n  flags = %s\n' "$objects" \
+printf 'build build/wasm/htvm_decoder.wasm: link%s\n  compiler = clang++-14\n  flags = %s\n' "$objects" \
     "--target=wasm32-wasi -mexec-model=reactor -Wl,--strip-all -Wl,--max-memory=536870912 -Wl,--export=malloc \
 -Wl,--export=free $exports"
