@@ -85,11 +85,12 @@ Located locate(const PosedScene& scene, const SurfaceMark& mark) {
     if (!(scene.present & part_bit(mark.part))) return {Vector3d::Zero(), Vector3d::Zero()};
     const PartFrame& frame = scene.parts[mark.part];
     const PartSet own = scene.present & joined_parts(mark.part);
-    Vector3d position = carry(frame, rest);
-    for (int round = 0; round < 16; ++round) {
-        const Vector3d away = evaluate_surface(scene, own, position).rest - rest;
-        if (away.norm() < 0.02) break;
-        position -= 0.7 * (frame.rotation * away);
+    Vector3d position = carry(frame, rest), looked_at = position;
+    double nearest = std::numeric_limits<double>::max();  // in folds the steps may lead ever farther away
+    for (int round = 0; round < 17 && nearest >= 0.02; ++round) {
+        const Vector3d away = evaluate_surface(scene, own, looked_at).rest - rest;
+        if (away.norm() < nearest) nearest = away.norm(), position = looked_at;
+        looked_at -= 0.7 * (frame.rotation * away);
     }
     constexpr double farthest = 10, slack = 6;  // mm
     if (std::abs(evaluate_surface(scene, scene.present, position).distance) > farthest)

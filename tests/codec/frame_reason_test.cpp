@@ -137,6 +137,17 @@ TEST(FrameReasons, TellOfARegionThatIsLostWhetherItIsPatchedOrNot) {
         1);
 }
 
+TEST(FrameReasons, TellOfACutHoweverCoarseTheCaptureIs) {
+    // Its edges are 50 mm long: what is farther off than two of them is farther than how well it fits is looked for.
+    TestSequence sequence{"cut", {}, {}};
+    for (int t = 0; t < 2; ++t) {
+        auto mesh = synthetic_frame(1500, 60).mesh;
+        for (auto& p : mesh.positions) p[0] += 2000.0F * static_cast<float>(t);
+        sequence.frames.push_back({std::move(mesh), {}});
+    }
+    EXPECT_EQ(reasons_of(encode(meshed_anew(sequence), patched_options())), (std::vector{none, cut}));
+}
+
 TEST(FrameReasons, TellOfSurfaceThatIsOffEverywhere) {
     auto sequence = horned_ball(3, never);
     for (auto& p : sequence.frames[2].mesh.positions)
@@ -167,7 +178,7 @@ TEST(FrameReasons, TellThatThereAreTooManyPatches) {
     auto sequence = horned_ball(1, never);
     for (int t = 1; t < 9; ++t) sequence.frames.push_back(horned_ball(2, t % 2 == 0 ? never : 1).frames[1]);
     sequence.frames.push_back(sequence.frames.back());
-    const auto coded = encode(sequence, patched_options());
+    const auto coded = encode(meshed_anew(sequence), patched_options());
     EXPECT_EQ(coded.infos.back().type, FrameType::intra);
     EXPECT_EQ(coded.infos.back().reason, patches);
 }

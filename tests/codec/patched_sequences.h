@@ -28,7 +28,7 @@ inline TestSequence horned_ball(int frames, int lost = 2, double horn = 150, dou
         frame.mesh.triangles = ball_now.triangles;
         out.frames.push_back(std::move(frame));
     }
-    return out;
+    return meshed_anew(std::move(out));
 }
 
 inline EncoderOptions patched_options() {

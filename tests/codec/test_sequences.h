@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -78,6 +79,15 @@ inline TestSequence sequence_of(const tfan_test::TestMesh& shape, int frames, un
         out.frames.push_back({std::move(mesh), {}});
     }
     return out;
+}
+
+// The same surfaces with the triangles in another order in each frame: nothing says then that its vertices were kept.
+inline TestSequence meshed_anew(TestSequence sequence) {
+    for (std::size_t t = 0; t < sequence.frames.size(); ++t) {
+        auto& triangles = sequence.frames[t].mesh.triangles;
+        std::rotate(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(t), triangles.end());
+    }
+    return sequence;
 }
 
 // A frame of the synthetic person with colours and normals. Kept, since making it takes longer than most tests that use

@@ -8,6 +8,7 @@
 #include <functional>
 #include <numbers>
 
+#include "surface/kept_vertices.h"
 #include "surface/limb_starts.h"
 
 namespace htvm::internal {
@@ -474,6 +475,58 @@ TEST(Solve, FindsTheSolutionOfASystemOfBlocks) {
     }
     const auto x = solve(pattern, system, 60, 1e-12);
     for (std::size_t h = 0; h < 5; ++h) EXPECT_LT((x[h] - truth[h]).norm(), 1e-8);
+}
+
+// ---- Captures that keep their vertices ------------------------------------------------------------------------------
+
+// Turned by 150 degrees about z, and bent.
+Vector3d thrown(const Vector3d& p) {
+    return Eigen::AngleAxisd(2.6, Vector3d::UnitZ()) * bent(p, 1.2) + Vector3d(100, 200, 50);
+}
+
+TEST(CarriedByVertices, LayATubeWhereItsVerticesHaveGone) {
+    const auto reference = sweep(121, 40, arm), captured = sweep(97, 52, arm);
+    const auto now = moved(captured, thrown);
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, in_millimetres());
+    const auto motions =
+        carried_by_vertices(mesh, {}, {captured.first, now.first, captured.second}, {.scale = {.units = 1}});
+    const auto moved_reference = deform(mesh, motions, {});
+    for (std::size_t v = 0; v < moved_reference.size(); ++v)
+        EXPECT_LT((vector(moved_reference[v]) - thrown(vector(reference.first[v]))).norm(), 6) << v;
+}
+
+TEST(CarriedByVertices, GoOnFromWhereTheReferenceWasLast) {
+    const auto reference = sweep(121, 40, arm);
+    const RigidMotion last{Eigen::AngleAxisd(1, Vector3d::UnitY()).toRotationMatrix(), Vector3d(300, 0, 0)};
+    const auto before = moved(sweep(97, 52, arm), last), now = moved(before, thrown);
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, in_millimetres());
+    const std::vector<RigidMotion> lasts(mesh.handles.size(), last);
+    const auto motions =
+        carried_by_vertices(mesh, lasts, {before.first, now.first, before.second}, {.scale = {.units = 1}});
+    for (std::size_t h = 0; h < motions.size(); ++h)
+        EXPECT_LT((motions[h](mesh.handles[h]) - thrown(last(mesh.handles[h]))).norm(), 30) << h;
+}
+
+TEST(CarriedByVertices, TakeHandlesWithoutVerticesAlong) {
+    const auto reference = sweep(121, 40, arm);
+    auto captured = sweep(97, 52, arm);
+    std::erase_if(captured.second, [&](const Triangle& t) { return captured.first[t[0]][0] > 300; });
+    for (auto& p : captured.first)
+        if (p[0] > 320) p = {10000, 0, 0};
+    const Vector3d shift(0, 900, 0);
+    const auto now = moved(captured, [&](const Vector3d& p) -> Vector3d { return p + shift; });
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, in_millimetres());
+    const auto motions =
+        carried_by_vertices(mesh, {}, {captured.first, now.first, captured.second}, {.scale = {.units = 1}});
+    ASSERT_EQ(motions.size(), mesh.handles.size());
+    for (const auto& motion : motions) EXPECT_LT((motion.shift - shift).norm(), 0.1);
+}
+
+TEST(CarriedByVertices, AreNoneWhereNoVertexIsBesideTheReference) {
+    const auto reference = sweep(121, 40, arm);
+    const auto far = moved(sweep(97, 52, arm), [](const Vector3d& p) -> Vector3d { return p + Vector3d(0, 0, 5000); });
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, in_millimetres());
+    EXPECT_TRUE(carried_by_vertices(mesh, {}, {far.first, far.first, far.second}, {.scale = {.units = 1}}).empty());
 }
 
 }  // namespace

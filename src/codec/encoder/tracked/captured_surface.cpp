@@ -70,12 +70,24 @@ void add_middle(SurfaceSamples& samples, std::span<const Point3f> points, std::s
     samples.normals.push_back(to_floats(normalised(normal)));
 }
 
+// A sample within a triangle of the reference.
+struct InnerSample {
+    Triangle corners{};
+    std::array<float, 3> shares{};  // of the corners
+    float weight = 0;               // the area that it stands for, by the largest triangle's
+};
+
+// The samples at which the captured surface is examined: the moved reference's vertices, then those within its
+// triangles.
+struct TargetPlaces {
+    SurfaceSamples samples;
+    std::vector<float> corner_weight;  // of each vertex, as InnerSample::weight
+    std::vector<InnerSample> inner;
+    std::vector<Colour> colours;  // that are shown at these; none: what the corners' shares make
+};
+
 // Where within a triangle samples lie, and how much of its area each stands for. Both rules integrate the square of a
 // linear function exactly.
-struct InnerSample {
-    std::array<float, 3> shares{};  // of the corners
-    float weight = 0;
-};
 struct SampleRule {
     float corner_weight = 0;  // of the vertices, per triangle
     std::span<const InnerSample> inner;
@@ -83,38 +95,100 @@ struct SampleRule {
 
 SampleRule rule_of(TargetSamples samples) {
     constexpr float third = 1.0F / 3, sixth = 1.0F / 6;
-    static constexpr std::array<InnerSample, 1> middle = {{{{third, third, third}, 0.75F}}};
-    static constexpr std::array<InnerSample, 3> three = {
-        {{{2 * third, sixth, sixth}, third}, {{sixth, 2 * third, sixth}, third}, {{sixth, sixth, 2 * third}, third}}};
+    static constexpr std::array<InnerSample, 1> middle = {{{{}, {third, third, third}, 0.75F}}};
+    static constexpr std::array<InnerSample, 3> three = {{{{}, {2 * third, sixth, sixth}, third},
+                                                          {{}, {sixth, 2 * third, sixth}, third},
+                                                          {{}, {sixth, sixth, 2 * third}, third}}};
     if (samples == TargetSamples::middles) return {1.0F / 12, middle};
     return {0, three};
 }
 
-// The samples at which the captured surface is examined: the moved reference's vertices, then those within each of its
-// triangles.
-SurfaceSamples samples_of(const MovedReference& moved, const SampleRule& rule) {
-    SurfaceSamples out;
+// Twice the area of each triangle, by the largest.
+std::vector<float> relative_areas(std::span<const LatticePoint> positions, std::span<const Triangle> triangles) {
+    std::vector<float> out;
+    out.reserve(triangles.size());
+    for (const auto& t : triangles) out.push_back(static_cast<float>(length(area_vector(positions, t))));
+    const float largest = out.empty() ? 1 : std::max(*std::max_element(out.begin(), out.end()), 1e-6F);
+    for (auto& area : out) area /= largest;
+    return out;
+}
+
+// In flat triangles, by a rule.
+TargetPlaces places_in_triangles(const MovedReference& moved, const SampleRule& rule) {
+    TargetPlaces out;
     const auto count = moved.positions.size() + rule.inner.size() * moved.triangles.size();
-    out.points.reserve(count);
-    out.normals.reserve(count);
-    out.points = points_of(moved.positions);
-    out.normals = points_of(moved.normals);
-    for (std::size_t triangle = 0; triangle < moved.triangles.size(); ++triangle)
+    auto& [points, normals] = out.samples;
+    points.reserve(count);
+    normals.reserve(count);
+    points = points_of(moved.positions);
+    normals = points_of(moved.normals);
+    out.corner_weight.assign(moved.positions.size(), 0);
+    out.inner.reserve(rule.inner.size() * moved.triangles.size());
+    const auto areas = relative_areas(moved.positions, moved.triangles);
+    for (std::size_t triangle = 0; triangle < moved.triangles.size(); ++triangle) {
+        const auto& t = moved.triangles[triangle];
+        for (const auto v : t) out.corner_weight[v] += areas[triangle] * rule.corner_weight;
         for (const auto& sample : rule.inner) {
-            const auto& t = moved.triangles[triangle];
             Vector3d point{}, normal{};
             for (std::size_t i = 0; i < 3; ++i) {
                 point = point + to_vector(moved.positions[t[i]]) * static_cast<double>(sample.shares[i]);
                 normal = normal + moved.normals[t[i]] * static_cast<double>(sample.shares[i]);
             }
-            // As a quadratic patch through the corners and what lies off the middles of the sides.
-            if (!moved.bulges.empty())
-                for (std::size_t i = 0; i < 3; ++i)
-                    point = point + moved.bulges[triangle][i] *
-                                        static_cast<double>(4 * sample.shares[i] * sample.shares[(i + 1) % 3]);
-            out.points.push_back(to_floats(point));
-            out.normals.push_back(to_floats(normalised(normal)));
+            points.push_back(to_floats(point));
+            normals.push_back(to_floats(normalised(normal)));
+            out.inner.push_back({t, sample.shares, areas[triangle] * sample.weight});
         }
+    }
+    return out;
+}
+
+// The middle between two places on the reference, which lie on one of its triangles.
+InnerSample middle_of(const InnerSample& a, const InnerSample& b) {
+    InnerSample out = a;
+    for (auto& share : out.shares) share /= 2;
+    for (std::size_t i = 0; i < 3; ++i) {
+        if (b.shares[i] <= 0) continue;
+        std::size_t at = 0;
+        while (at < 3 && !(out.shares[at] > 0 && out.corners[at] == b.corners[i])) ++at;
+        if (at == 3)
+            at = static_cast<std::size_t>(std::min_element(out.shares.begin(), out.shares.end()) - out.shares.begin());
+        out.corners[at] = b.corners[i];
+        out.shares[at] += b.shares[i] / 2;
+    }
+    return out;
+}
+
+// Where each vertex of the first levels of detail lies on the reference's triangles, behind those of its own vertices.
+std::vector<InnerSample> places_of_detail(const SurfaceDetail& detail, std::size_t levels, std::size_t vertices) {
+    std::vector<InnerSample> out;
+    for (std::uint32_t v = 0; v < vertices; ++v) out.push_back({{v, v, v}, {1, 0, 0}, 0});
+    for (std::size_t k = 0; k < levels; ++k)
+        for (const auto& s : detail.levels[k].stencils) out.push_back(middle_of(out[s.a], out[s.b]));
+    return out;
+}
+
+// On the surface as it is shown: at the vertices of its detail. The captured surface is met all over a large triangle,
+// so that what the detail leaves off in one place is not taken for all of it.
+TargetPlaces places_on_detail(const MovedReference& moved) {
+    const auto& detail = *moved.detail;
+    const std::size_t vertices = moved.positions.size(), levels = levels_to_sample(detail, vertices);
+    const std::span<const Triangle> triangles = levels > 0 ? detail.triangles(levels) : moved.triangles;
+    std::vector<LatticePoint> shown(moved.positions.begin(), moved.positions.end());
+    if (levels > 0) add_detail(detail, levels, moved.triangles, shown);
+    TargetPlaces out;
+    out.samples = {points_of(shown), points_of(vertex_normals(shown, triangles))};
+    std::vector<float> weight(shown.size(), 0);
+    const auto areas = relative_areas(shown, triangles);
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        for (const auto v : triangles[t]) weight[v] += areas[t] / 3;
+    const auto places = places_of_detail(detail, levels, vertices);
+    out.corner_weight.assign(weight.begin(), weight.begin() + static_cast<std::ptrdiff_t>(vertices));
+    for (std::size_t v = vertices; v < shown.size(); ++v)
+        out.inner.push_back({places[v].corners, places[v].shares, weight[v]});
+    if (moved.colours.empty()) return out;
+    out.colours.assign(moved.colours.begin(), moved.colours.end());
+    if (levels > 0) add_detail(detail, levels, out.colours);
+    out.colours.erase(out.colours.begin(), out.colours.begin() + static_cast<std::ptrdiff_t>(vertices));
     return out;
 }
 
@@ -122,41 +196,27 @@ SurfaceSamples samples_of(const MovedReference& moved, const SampleRule& rule) {
 // squares by conjugate gradients, with the weights that integrate squares exactly.
 struct SurfaceFit {
     std::span<const Triangle> triangles;
-    SampleRule rule;
-    std::vector<float> corner_weight, inner_weight;  // zero if the sample has no value; 1 where it is largest
-    std::vector<float> per_diagonal;                 // 1 / the matrix's diagonal; 0 where that is 0
+    std::vector<float> corner_weight;  // zero if the sample has no value
+    std::vector<InnerSample> inner;    // likewise their weights
+    std::vector<float> per_diagonal;   // 1 / the matrix's diagonal; 0 where that is 0
 
     std::vector<Four> times(const std::vector<Four>& x) const;
     std::vector<Four> fitted(std::span<const Four> seen) const;
 };
 
-SurfaceFit make_surface_fit(const MovedReference& moved, const SampleRule& rule,
+SurfaceFit make_surface_fit(const MovedReference& moved, const TargetPlaces& places,
                             const std::vector<SurfacePoint>& targets) {
-    const std::size_t vertices = moved.positions.size(), inner = rule.inner.size();
-    SurfaceFit out;
-    out.triangles = moved.triangles;
-    out.rule = rule;
-    out.corner_weight.assign(vertices, 0);
-    out.inner_weight.assign(inner * moved.triangles.size(), 0);
-    std::vector<float> area;
-    area.reserve(moved.triangles.size());
-    for (const auto& t : moved.triangles) area.push_back(static_cast<float>(length(area_vector(moved.positions, t))));
-    const float largest = area.empty() ? 1 : std::max(*std::max_element(area.begin(), area.end()), 1e-6F);
+    const std::size_t vertices = moved.positions.size();
+    SurfaceFit out{moved.triangles, places.corner_weight, places.inner, {}};
     std::vector<float> diagonal(vertices, 0);
-    for (std::size_t t = 0; t < moved.triangles.size(); ++t) {
-        const auto& corners = moved.triangles[t];
-        const float share = area[t] / largest;
-        for (const auto v : corners)
-            if (targets[v].found()) out.corner_weight[v] += share * rule.corner_weight;
-        for (std::size_t k = 0; k < inner; ++k) {
-            if (!targets[vertices + inner * t + k].found()) continue;
-            const auto& sample = rule.inner[k];
-            out.inner_weight[inner * t + k] = share * sample.weight;
-            for (std::size_t i = 0; i < 3; ++i)
-                diagonal[corners[i]] += share * sample.weight * sample.shares[i] * sample.shares[i];
-        }
+    for (std::size_t i = 0; i < out.inner.size(); ++i) {
+        auto& sample = out.inner[i];
+        if (!targets[vertices + i].found()) sample.weight = 0;
+        for (std::size_t c = 0; c < 3; ++c)
+            diagonal[sample.corners[c]] += sample.weight * sample.shares[c] * sample.shares[c];
     }
     for (std::size_t v = 0; v < vertices; ++v) {
+        if (!targets[v].found()) out.corner_weight[v] = 0;
         diagonal[v] += out.corner_weight[v];
         out.per_diagonal.push_back(diagonal[v] > 0 ? 1 / diagonal[v] : 0);
     }
@@ -167,31 +227,30 @@ std::vector<Four> SurfaceFit::times(const std::vector<Four>& x) const {
     std::vector<Four> out(x.size());
     for (std::size_t v = 0; v < x.size(); ++v)
         for (std::size_t i = 0; i < 4; ++i) out[v][i] = corner_weight[v] * x[v][i];
-    const float* weight = inner_weight.data();
-    for (const auto& [a, b, c] : triangles)
-        for (const auto& sample : rule.inner) {
-            const auto& s = sample.shares;
-            Four value{};
-            for (std::size_t i = 0; i < 4; ++i) value[i] = *weight * (s[0] * x[a][i] + s[1] * x[b][i] + s[2] * x[c][i]);
-            for (std::size_t i = 0; i < 4; ++i) out[a][i] += s[0] * value[i];
-            for (std::size_t i = 0; i < 4; ++i) out[b][i] += s[1] * value[i];
-            for (std::size_t i = 0; i < 4; ++i) out[c][i] += s[2] * value[i];
-            ++weight;
-        }
+    for (const auto& sample : inner) {
+        const auto& [a, b, c] = sample.corners;
+        const auto& s = sample.shares;
+        Four value{};
+        for (std::size_t i = 0; i < 4; ++i)
+            value[i] = sample.weight * (s[0] * x[a][i] + s[1] * x[b][i] + s[2] * x[c][i]);
+        for (std::size_t i = 0; i < 4; ++i) out[a][i] += s[0] * value[i];
+        for (std::size_t i = 0; i < 4; ++i) out[b][i] += s[1] * value[i];
+        for (std::size_t i = 0; i < 4; ++i) out[c][i] += s[2] * value[i];
+    }
     return out;
 }
 
 // seen: zero at samples that have no value.
 std::vector<Four> SurfaceFit::fitted(std::span<const Four> seen) const {
     constexpr int rounds = 4;  // two more change the bytes by nothing that can be told from chance
-    const std::size_t vertices = corner_weight.size(), inner = rule.inner.size();
+    const std::size_t vertices = corner_weight.size();
     std::vector<Four> x(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(vertices)), residual(vertices);
     for (std::size_t v = 0; v < vertices; ++v)
         for (std::size_t i = 0; i < 4; ++i) residual[v][i] = corner_weight[v] * seen[v][i];
-    for (std::size_t place = 0; place < inner_weight.size(); ++place)
+    for (std::size_t place = 0; place < inner.size(); ++place)
         for (std::size_t corner = 0; corner < 3; ++corner) {
-            auto& sum = residual[triangles[place / inner][corner]];
-            const float weight = inner_weight[place] * rule.inner[place % inner].shares[corner];
+            auto& sum = residual[inner[place].corners[corner]];
+            const float weight = inner[place].weight * inner[place].shares[corner];
             for (std::size_t i = 0; i < 4; ++i) sum[i] += weight * seen[vertices + place][i];
         }
     const auto product = times(x);
@@ -239,16 +298,14 @@ std::vector<Four> SurfaceFit::fitted(std::span<const Four> seen) const {
 // What of the surface is nearest to each sample: first to the vertices, then to what lies within the triangles,
 // beginning where their first corners were found. near: a captured vertex that may be beside each vertex; set to those
 // that are.
-std::vector<SurfacePoint> targets_of(const SurfaceSamples& samples, std::span<const Triangle> triangles,
-                                     const SurfaceIndex& surface, const TargetSearch& how,
+std::vector<SurfacePoint> targets_of(const TargetPlaces& places, const SurfaceIndex& surface, const TargetSearch& how,
                                      std::span<std::uint32_t> near) {
     const FacingReach within{.reach = static_cast<float>(how.reach.value), .along = true};
-    const auto points = std::span(samples.points), normals = std::span(samples.normals);
+    const auto points = std::span(places.samples.points), normals = std::span(places.samples.normals);
     auto out =
         closest_facing(surface, points.first(near.size()), normals.first(near.size()), within, how.threads, near);
     std::vector<std::uint32_t> near_inner(points.size() - near.size());
-    const std::size_t in_triangle = triangles.empty() ? 1 : near_inner.size() / triangles.size();
-    for (std::size_t i = 0; i < near_inner.size(); ++i) near_inner[i] = near[triangles[i / in_triangle][0]];
+    for (std::size_t i = 0; i < near_inner.size(); ++i) near_inner[i] = near[places.inner[i].corners[0]];
     const auto inner = closest_facing(surface, points.subspan(near.size()), normals.subspan(near.size()), within,
                                       how.threads, near_inner);
     out.insert(out.end(), inner.begin(), inner.end());
@@ -289,10 +346,11 @@ void leave_out_what_is_beyond(const SurfaceSamples& samples, const SurfaceIndex&
 
 // At each sample, how far the surface is along its normal, in lattice units, and what its colour is less that of the
 // reference, in levels.
-std::vector<Four> seen_at(const SurfaceSamples& samples, const MovedReference& moved, const SampleRule& rule,
-                          const LatticeMesh& captured, const std::vector<SurfacePoint>& targets, Threads threads) {
+std::vector<Four> seen_at(const TargetPlaces& places, const MovedReference& moved, const LatticeMesh& captured,
+                          const std::vector<SurfacePoint>& targets, Threads threads) {
     std::vector<Four> out(targets.size());
-    const std::size_t vertices = moved.positions.size(), inner = rule.inner.size();
+    const auto& samples = places.samples;
+    const std::size_t vertices = moved.positions.size();
     const auto look_at = [&](std::size_t i) {
         auto& [distance, red, green, blue] = out[i];
         for (std::size_t axis = 0; axis < 3; ++axis)
@@ -306,10 +364,11 @@ std::vector<Four> seen_at(const SurfaceSamples& samples, const MovedReference& m
         for (std::size_t corner = 0; corner < 3; ++corner) add(captured.colours[t[corner]], targets[i].shares[corner]);
         if (i < vertices) {
             add(moved.colours[i], -1);
+        } else if (!places.colours.empty()) {
+            add(places.colours[i - vertices], -1);
         } else {
-            const auto& corners = moved.triangles[(i - vertices) / inner];
-            const auto& shares = rule.inner[(i - vertices) % inner].shares;
-            for (std::size_t corner = 0; corner < 3; ++corner) add(moved.colours[corners[corner]], -shares[corner]);
+            const auto& sample = places.inner[i - vertices];
+            for (std::size_t c = 0; c < 3; ++c) add(moved.colours[sample.corners[c]], -sample.shares[c]);
         }
         red = colour[0], green = colour[1], blue = colour[2];
     };
@@ -326,6 +385,13 @@ std::vector<Four> seen_at(const SurfaceSamples& samples, const MovedReference& m
 
 }  // namespace
 
+std::size_t levels_to_sample(const SurfaceDetail& detail, std::size_t vertices) {
+    constexpr std::size_t most_often = 4;
+    std::size_t out = 0, all = vertices;
+    while (out < detail.levels.size() && all < most_often * vertices) all += detail.levels[out++].stencils.size();
+    return out;
+}
+
 SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions& options) {
     // The cells must not be too fine for the search to go through, as for captures with tiny triangles, or none. Every
     // eighth triangle gives a good enough estimate of the edges.
@@ -339,47 +405,25 @@ SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions&
     return out;
 }
 
-std::vector<Bulge> bulges_of(const SurfaceDetail& detail, std::span<const LatticePoint> moved,
-                             std::span<const Triangle> triangles) {
-    if (detail.empty()) return {};
-    std::vector<LatticePoint> shown(moved.begin(), moved.end());
-    add_detail(detail, 1, triangles, shown);
-    const auto& level = detail.levels.front();
-    std::vector<Bulge> out(triangles.size(), Bulge{});
-    for (std::size_t part = 0; part < level.triangles.size(); ++part)
-        for (const auto v : level.triangles[part]) {
-            if (v < level.first) continue;
-            const auto& s = level.stencils[v - level.first];
-            const auto& corners = triangles[level.parent[part]];
-            for (std::size_t i = 0; i < 3; ++i) {
-                const auto from = corners[i], to = corners[(i + 1) % 3];
-                if (std::min(from, to) == s.a && std::max(from, to) == s.b)
-                    out[level.parent[part]][i] =
-                        to_vector(shown[v]) - (to_vector(shown[s.a]) + to_vector(shown[s.b])) * 0.5;
-            }
-        }
-    return out;
-}
-
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
                                     const SurfaceIndex& surface, const TargetSearch& how,
                                     std::vector<std::uint32_t> near) {
     const auto& threads = how.threads;
-    const auto rule = rule_of(how.samples);
-    const auto samples = samples_of(moved, rule);
+    const bool detailed = moved.detail && !moved.detail->empty();
+    const auto places = detailed ? places_on_detail(moved) : places_in_triangles(moved, rule_of(how.samples));
     const std::size_t vertices = moved.positions.size();
     near.resize(vertices, OrientedPoints::no_point);
-    auto targets = targets_of(samples, moved.triangles, surface, how, near);
+    auto targets = targets_of(places, surface, how, near);
     TrackedTargets out;
     if (!surface.from_border.empty()) {
-        leave_out_what_is_beyond(samples, surface, targets);
+        leave_out_what_is_beyond(places.samples, surface, targets);
         out.seen.resize(vertices);
         const auto far = static_cast<float>(how.far.value);
         for (std::size_t v = 0; v < vertices; ++v)
             if (targets[v].found()) out.seen[v] = targets[v].squared_distance > far * far ? 2 : 1;
     }
-    const auto fit = make_surface_fit(moved, rule, targets);
-    const auto fitted = fit.fitted(seen_at(samples, moved, rule, captured, targets, threads));
+    const auto fit = make_surface_fit(moved, places, targets);
+    const auto fitted = fit.fitted(seen_at(places, moved, captured, targets, threads));
     out.near = std::move(near);
     out.displacement.resize(vertices);
     // A field cannot code more than this: 16 mm on the finest lattice. The surface then lags behind by the rest.
@@ -498,7 +542,7 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
     std::size_t strays = 0;
     for (const double distance : squared) {
         squares += distance;
-        if (distance > stray) ++strays;
+        if (distance >= stray) ++strays;  // what is not found is as far as `reach`, which may be no farther
     }
     const auto count = static_cast<double>(points.size());
     return {LatticeUnits(std::sqrt(squares / count)),

@@ -23,19 +23,17 @@ namespace htvm::internal {
 // The captured mesh, prepared for registration to it.
 SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions& options);
 
-// How far a triangle's surface passes off the middle of each of its sides, from one corner to the next.
-using Bulge = std::array<Vector3d, 3>;
-// How each triangle of a moved reference bulges that is shown with detail; nothing where there is none.
-std::vector<Bulge> bulges_of(const SurfaceDetail& detail, std::span<const LatticePoint> moved,
-                             std::span<const Triangle> triangles);
+// How many levels of a reference's detail are registered and looked for beside its own vertices: as few as make it four
+// times as many or more, or all.
+std::size_t levels_to_sample(const SurfaceDetail& detail, std::size_t vertices);
 
 // A reference mesh moved by its nodes.
 struct MovedReference {
     std::span<const LatticePoint> positions;
     std::span<const Vector3d> normals;  // one per vertex
     std::span<const Triangle> triangles;
-    std::span<const Colour> colours;  // one per vertex, or none
-    std::span<const Bulge> bulges{};  // one per triangle, or none: they are shown flat
+    std::span<const Colour> colours;        // one per vertex, or none
+    const SurfaceDetail* detail = nullptr;  // with which it is shown; null, or empty: none
 };
 
 struct TrackedTargets {
@@ -47,7 +45,7 @@ struct TrackedTargets {
     std::vector<std::int32_t> colours;       // three per vertex, levels to add; empty if the reference has no colours
 };
 
-// From where in each triangle the surface is looked for, beside the vertices.
+// From where in each flat triangle the surface is looked for, beside the vertices.
 enum class TargetSamples : std::uint8_t { middles, three };
 
 struct TargetSearch {
@@ -82,7 +80,7 @@ CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double>
 // Measured with a few thousand samples in each direction; the worse of the two directions.
 struct TrackedFit {
     LatticeUnits rms;             // RMS distance from surface to surface; no distance counts as more than `reach`
-    double stray_share = 0;       // share of the samples that are farther than `stray`
+    double stray_share = 0;       // share of the samples that are as far as `stray`
     LatticeUnits worst_region;    // the RMS distance in the worst cube of space
     std::vector<double> squared;  // squared distances of the decoded mesh's samples from the captured surface
     // Where surface comes and goes, what nothing is tracked beside counts as uncovered, not as far off:
@@ -91,7 +89,7 @@ struct TrackedFit {
 };
 
 struct TrackedFitOptions {
-    // What is farther off is astray; > 0.
+    // What is as far off is astray; > 0.
     LatticeUnits stray = tracking_numbers.stray_in_edges * usual_request.captured_edge;
     // Beyond it the captured surface is not searched; > 0.
     LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.fit_reach);

@@ -174,9 +174,8 @@ Result<std::optional<TrackedIntra>> code_levels(const TrackedWork& work, const F
     const auto normals = vertex_normals(mesh.positions, mesh.triangles);
     if (!source.colours.empty()) {
         mesh.colours.resize(mesh.positions.size());
-        const auto bulges = bulges_of(coded.detail, mesh.positions, mesh.triangles);
         const auto targets = find_tracked_targets(
-            {mesh.positions, normals, mesh.triangles, mesh.colours, bulges}, source, work.surface,
+            {mesh.positions, normals, mesh.triangles, mesh.colours, &coded.detail}, source, work.surface,
             {.reach = configuration.scale.on_lattice(tracking_numbers.reach), .threads = configuration.threads});
         mesh.colours = recoloured(mesh.colours, targets.colours);
     }

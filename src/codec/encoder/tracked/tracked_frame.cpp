@@ -91,13 +91,64 @@ TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, cons
     return out;
 }
 
-DeformableMesh make_tracked_deformable(const NodeReference& reference, const DeformationOptions& options,
-                                       std::span<const Colour> colours) {
+namespace {
+
+// What the handles weigh in the middle between two vertices.
+VertexWeights mean_weights(const VertexWeights& a, const VertexWeights& b) {
+    struct Share {
+        std::uint16_t handle = 0;
+        int twice = 0;
+    };
+    std::vector<Share> shares;
+    for (const auto* of : {&a, &b})
+        for (std::size_t k = 0; k < handles_per_vertex && of->weight[k] > 0; ++k) {
+            const auto same = std::find_if(shares.begin(), shares.end(),
+                                           [&](const Share& share) { return share.handle == of->handle[k]; });
+            if (same != shares.end())
+                same->twice += of->weight[k];
+            else
+                shares.push_back({of->handle[k], of->weight[k]});
+        }
+    std::sort(shares.begin(), shares.end(), [](const Share& x, const Share& y) {
+        return x.twice != y.twice ? x.twice > y.twice : x.handle < y.handle;
+    });
+    if (shares.size() > handles_per_vertex) shares.resize(handles_per_vertex);
+    int all = 0;
+    for (const auto& share : shares) all += share.twice;
+    VertexWeights out;
+    int left = 1 << weight_bits;
+    for (std::size_t k = shares.size(); k-- > 1;) {
+        const int weight = (shares[k].twice << weight_bits) / all;
+        if (weight == 0) continue;
+        out.handle[k] = shares[k].handle;
+        out.weight[k] = static_cast<std::uint16_t>(weight);
+        left -= weight;
+    }
+    if (!shares.empty()) out.handle[0] = shares[0].handle, out.weight[0] = static_cast<std::uint16_t>(left);
+    return out;
+}
+
+}  // namespace
+
+DeformableMesh make_tracked_deformable(const NodeReference& reference, const SurfaceDetail& detail,
+                                       const DeformationOptions& options, std::span<const Colour> colours) {
     std::vector<Eigen::Vector3d> handles;
     for (const auto pivot : reference.graph.pivots) handles.emplace_back(pivot.x, pivot.y, pivot.z);
-    return make_deformable(points_of(reference.mesh.positions), reference.mesh.triangles, reference.nodes.weights,
-                           handles, pairs_of(reference), options,
-                           colours.empty() ? std::span<const Colour>(reference.mesh.colours) : colours);
+    const auto& mesh = reference.mesh;
+    auto positions = mesh.positions;
+    auto weights = reference.nodes.weights;
+    std::vector<Colour> seen(mesh.colours);
+    if (!colours.empty()) seen.assign(colours.begin(), colours.end());
+    const auto levels = levels_to_sample(detail, positions.size());
+    if (levels > 0) {
+        add_detail(detail, levels, mesh.triangles, positions);
+        if (!seen.empty()) add_detail(detail, levels, seen);
+        for (std::size_t k = 0; k < levels; ++k)
+            for (const auto& stencil : detail.levels[k].stencils)
+                weights.push_back(mean_weights(weights[stencil.a], weights[stencil.b]));
+    }
+    return make_deformable(points_of(positions), levels > 0 ? detail.triangles(levels) : mesh.triangles,
+                           std::move(weights), handles, pairs_of(reference), options, seen);
 }
 
 namespace {
@@ -113,6 +164,7 @@ std::vector<NodeMotions> motions_of(const NodeStarts& starts, const DeformableMe
     if (!starts.before_last.empty()) out.push_back(moved_on(deformable, starts.before_last, starts.last));
     if (!starts.gone_on.empty()) out.emplace_back(starts.gone_on.begin(), starts.gone_on.end());
     if (!starts.skeletal.empty()) out.emplace_back(starts.skeletal.begin(), starts.skeletal.end());
+    if (!starts.carried.empty()) out.emplace_back(starts.carried.begin(), starts.carried.end());
     return out;
 }
 
@@ -134,6 +186,7 @@ NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceI
     NodeRegistration out;
     out.start = nearest_of(from, deformable, surface, options);
     out.motion = register_deformation(deformable, surface, from[out.start], options, &out.form);
+    out.carried.assign(starts.carried.begin(), starts.carried.end());
     return out;
 }
 
@@ -199,10 +252,9 @@ TrackedTargets targets_of(const FrameSource& source, const MovedSurface& moved) 
         if (!reference.mesh.colours.empty()) none.colours.resize(3 * moved.positions.size());
         return none;
     }
-    const auto bulges =
-        options.detail ? bulges_of(*options.detail, moved.positions, reference.mesh.triangles) : std::vector<Bulge>{};
     return find_tracked_targets(
-        {moved.positions, moved.normals, reference.mesh.triangles, reference.mesh.colours, bulges}, captured, surface,
+        {moved.positions, moved.normals, reference.mesh.triangles, reference.mesh.colours, options.detail}, captured,
+        surface,
         {.reach = options.reach,
          .far = options.scale.on_lattice(tracking_numbers.far_from_seen),
          .samples = options.target_samples,

@@ -51,19 +51,23 @@ struct TrackedFrameOptions {
     Threads threads = {};
 };
 
-// The reference, prepared for registration; made once per reference.
-DeformableMesh make_tracked_deformable(const NodeReference& reference, const DeformationOptions& options,
-                                       std::span<const Colour> colours = {});
+// The reference as it is shown, with levels_to_sample() levels of its detail, prepared for registration; made once per
+// reference. Its own few vertices would say too little, and lie off what is shown between them. colours: of its own
+// vertices, for the registration alone; none: those that it has.
+DeformableMesh make_tracked_deformable(const NodeReference& reference, const SurfaceDetail& detail,
+                                       const DeformationOptions& options, std::span<const Colour> colours = {});
 
 // Possible starts of a registration, each one motion per node, or empty. last, before_last: of the two previous frames.
-// gone_on: behind a TP-frame, as the surface moved before it. skeletal: where the skeleton moves each node.
+// gone_on: behind a TP-frame, as the surface moved before it. skeletal: where the skeleton moves each node. carried:
+// where the capture's own vertices move it, if it has kept them.
 struct NodeStarts {
-    std::span<const RigidMotion> last, before_last, gone_on, skeletal;
+    std::span<const RigidMotion> last, before_last, gone_on, skeletal, carried;
 };
 struct NodeRegistration {
-    std::vector<RigidMotion> motion;  // of each node, reference -> frame
-    DeformationForm form;             // how well the captured surface determines it
-    std::size_t start = 0;            // which of the starts it began at
+    std::vector<RigidMotion> motion;   // of each node, reference -> frame
+    DeformationForm form;              // how well the captured surface determines it
+    std::size_t start = 0;             // which of the starts it began at
+    std::vector<RigidMotion> carried;  // NodeStarts::carried
 };
 // From the start that lies nearest to the surface.
 NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,

@@ -39,7 +39,8 @@ void register_next(const TrackedWork& work, const Tracking& tracking, const Trac
     find_surface(work.configuration, next, stages);
     if (assumed.nodes && !tracking.lost && can_be_moved(work.sequence, next.captured.mesh))
         next.ahead.registered = register_frame(work.configuration, *work.reference, *next.ahead.surface, next.captured,
-                                               {assumed.nodes->motion, work.sequence.history.last, {}, {}},
+                                               {assumed.nodes->motion, work.sequence.history.last, {}, {}, {}},
+                                               {work.captured.mesh.positions, work.captured.mesh.triangles},
                                                present(work.sequence, true), stages, &tracking.lost);
 }
 
@@ -86,18 +87,24 @@ Result<std::shared_ptr<TrackedReference>> reference_of(const TrackedWork& work, 
     out->decoded = std::move(*decoded);
     out->origin = std::move(origin);
     if (out->decoded.by_nodes)
-        out->deformable =
-            make_tracked_deformable(*out->decoded.by_nodes, deformation_options(configuration), out->origin.colours);
+        out->deformable = make_tracked_deformable(*out->decoded.by_nodes, frame.detail,
+                                                  deformation_options(configuration), out->origin.colours);
     return out;
 }
 
+std::shared_ptr<const CapturedVertices> vertices_of(const CapturedFrame& captured) {
+    return std::make_shared<const CapturedVertices>(CapturedVertices{captured.mesh.positions, captured.mesh.triangles});
+}
+
 Result<TrackedSequence> after(const TrackedWork& work, TrackedMotion& motion) {
-    return TrackedSequence{work.sequence.next_frame + 1, work.sequence.reference, std::move(motion.history)};
+    return TrackedSequence{work.sequence.next_frame + 1, work.sequence.reference, std::move(motion.history),
+                           vertices_of(work.captured)};
 }
 
 Result<TrackedSequence> after(const TrackedWork& work, TrackedIntra& intra) {
     const auto& before = work.sequence;
-    if (!intra.frame.referred) return TrackedSequence{before.next_frame + 1, before.reference, before.history};
+    if (!intra.frame.referred)
+        return TrackedSequence{before.next_frame + 1, before.reference, before.history, before.captured};
     auto reference = reference_of(work, intra.frame, std::move(intra.origin), std::move(intra.pose), intra.step, {});
     if (!reference) return tl::unexpected(reference.error());
     auto& in_use = **reference;
@@ -108,6 +115,7 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedIntra& intra) {
     out.history.best_fit = intra.best_fit;
     out.history.targets = on_new_reference(before.history.targets, {}, 0, {});
     out.history.presence = std::move(intra.presence);
+    out.captured = vertices_of(work.captured);
     out.reference = std::move(*reference);
     return out;
 }
@@ -128,6 +136,7 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedPatch& patch) {
     out.history.targets = std::move(patch.targets);
     out.history.presence = std::move(patch.presence);
     out.history.in_vain = patch.in_vain;
+    out.captured = vertices_of(work.captured);
     if (!patch.before_last.empty())
         out.history.gone_on = moved_on(before.deformable, patch.before_last, patch.last, in_use.deformable.handles);
     out.reference = std::move(*reference);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "codec/encoder/lattice_motion.h"
+#include "surface/kept_vertices.h"
 
 namespace htvm::internal {
 namespace {
@@ -15,6 +16,35 @@ std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration
     std::vector<RigidMotion> out;
     for (const auto v : reference.by_nodes->nodes.vertex) out.push_back(bones[reference.skinned.bone_of_vertex[v]]);
     return out;
+}
+
+// What is there of what is registered: DeformableMesh has detail.
+std::vector<std::uint8_t> shown_presence(const TrackedReference& reference, std::span<const std::uint8_t> presence) {
+    std::vector<std::uint8_t> out(presence.begin(), presence.end());
+    const auto& detail = reference.decoded.detail;
+    if (const auto levels = levels_to_sample(detail, out.size()); levels > 0 && !out.empty())
+        add_detail(detail, levels, out);
+    return out;
+}
+
+// Where a capture that has kept its vertices moves each node; none if it has not.
+std::vector<RigidMotion> carried_nodes(const Configuration& configuration, const TrackedReference& reference,
+                                       const LatticeMesh& captured, const VerticesBefore& before,
+                                       std::span<const RigidMotion> last) {
+    const bool kept = before.positions.size() == captured.positions.size() &&
+                      std::equal(before.triangles.begin(), before.triangles.end(), captured.triangles.begin(),
+                                 captured.triangles.end());
+    if (!kept || captured.positions.empty()) return {};
+    const auto was = points_of(before.positions), is = points_of(captured.positions);
+    KeptVerticesOptions options;
+    options.scale = configuration.scale;
+    options.threads = configuration.threads;
+    return carried_by_vertices(reference.deformable, last, {was, is, captured.triangles}, options);
+}
+
+VerticesBefore vertices_before(const TrackedSequence& sequence) {
+    if (!sequence.captured) return {};
+    return {sequence.captured->positions, sequence.captured->triangles};
 }
 
 std::int64_t frames_since_intra(const TrackedWork& work) {
@@ -54,14 +84,17 @@ SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame&
 
 NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
                                 const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
-                                std::span<const std::uint8_t> presence, std::vector<StageTime>& stages,
-                                const std::atomic<bool>* in_vain) {
+                                const VerticesBefore& before, std::span<const std::uint8_t> presence,
+                                std::vector<StageTime>& stages, const std::atomic<bool>* in_vain) {
     StageClock clock(stages);
     const auto skeletal = skeletal_node_motion(configuration, reference.decoded, captured.pose);
+    const auto carried = carried_nodes(configuration, reference, captured.mesh, before, starts.last);
     starts.skeletal = skeletal;
+    starts.carried = carried;
     auto options = deformation_options(configuration, tracking_effort(captured.effort));
     options.in_vain = in_vain;
-    options.present = presence;
+    const auto present = shown_presence(reference, presence);
+    options.present = present;
     auto out = register_nodes(reference.deformable, surface, starts, options);
     clock.done("registration");
     return out;
@@ -77,8 +110,8 @@ const NodeRegistration& register_once(const TrackedWork& work, Tracking& trackin
     if (!tracking.registered) {
         const auto& history = work.sequence.history;
         tracking.registered = register_frame(work.configuration, *work.reference, work.surface, work.captured,
-                                             {history.last, history.before_last, history.gone_on, {}},
-                                             present(work.sequence), work.stages);
+                                             {history.last, history.before_last, history.gone_on, {}, {}},
+                                             vertices_before(work.sequence), present(work.sequence), work.stages);
     }
     return *tracking.registered;
 }
@@ -89,10 +122,11 @@ FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered,
     const auto skeletal = skeletal_node_motion(work.configuration, work.reference->decoded, work.captured.pose);
     FoundLimbs out{std::move(registered)};
     auto options = deformation_options(work.configuration, work.effort);
-    options.present = present(work.sequence);
-    out.any =
-        follow_lost_limbs(work.reference->deformable, work.surface,
-                          {history.last, history.before_last, history.gone_on, skeletal}, options, out.registered);
+    const auto there = shown_presence(*work.reference, present(work.sequence));
+    options.present = there;
+    out.any = follow_lost_limbs(work.reference->deformable, work.surface,
+                                {history.last, history.before_last, history.gone_on, skeletal, out.registered.carried},
+                                options, out.registered);
     clock.done("registration");
     return out;
 }

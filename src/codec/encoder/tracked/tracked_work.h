@@ -63,11 +63,18 @@ struct MotionHistory {
     VainAttempts in_vain;
 };
 
+// A captured mesh without its attributes: the next one may have kept its vertices.
+struct CapturedVertices {
+    std::vector<LatticePoint> positions;
+    std::vector<Triangle> triangles;
+};
+
 // The strategy's state between two frames.
 struct TrackedSequence {
     std::uint32_t next_frame = 0;
     std::shared_ptr<const TrackedReference> reference;  // null before the first I-frame
     MotionHistory history;
+    std::shared_ptr<const CapturedVertices> captured;  // of the frame that the history ends with; null if there is none
 };
 
 // What was found of a frame that waits, while others were coded.
@@ -151,12 +158,18 @@ SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame&
 // coded, what was there before that one. One per vertex, or none: all is. behind: of the frame behind the next one.
 std::span<const std::uint8_t> present(const TrackedSequence& sequence, bool behind = false);
 
-// Registers the reference's nodes to a captured surface. starts: but for the skeleton's. presence: what of the
-// reference was seen lately. in_vain: may end it early.
+// The mesh that was captured one frame before; empty if there is none.
+struct VerticesBefore {
+    std::span<const LatticePoint> positions;
+    std::span<const Triangle> triangles;
+};
+// Registers the reference's nodes to a captured surface. starts: but for the skeleton's and the vertices'. before: what
+// was captured in the frame that starts.last is of. presence: what of the reference was seen lately. in_vain: may end
+// it early.
 NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
                                 const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
-                                std::span<const std::uint8_t> presence, std::vector<StageTime>& stages,
-                                const std::atomic<bool>* in_vain = nullptr);
+                                const VerticesBefore& before, std::span<const std::uint8_t> presence,
+                                std::vector<StageTime>& stages, const std::atomic<bool>* in_vain = nullptr);
 // The same of the frame that is coded, unless it is registered already.
 const NodeRegistration& register_once(const TrackedWork& work, Tracking& tracking);
 
