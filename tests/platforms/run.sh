@@ -47,7 +47,7 @@ exports() {
 
 try() {
     local platform=$1 emulate=(tests/platforms/emulate.sh "$1") build=build/$1 library floor
-    local targets=(digests encoded htvm_c_shared example_encode example_decode "${floors[@]/#/test_}")
+    local targets=(digests encoded htvm_c_shared htvm_python example_encode example_decode "${floors[@]/#/test_}")
     { tests/platforms/configure.sh "$platform" && cmake --build "$build" --target "${targets[@]}"; } >"$work/log" 2>&1 ||
         { failed "$platform" "build"; return; }
     if "${emulate[@]}" "$build/digests" 4 $streams/*.htvm >"$work/log"; then
@@ -74,6 +74,11 @@ try() {
         failed "$platform" "C library: exports htvm_* alone"
     else
         said "$platform" "C library: exports htvm_* alone" "$(wc -l <"$work/exported") functions"
+    fi
+    if tests/platforms/wheel.sh "$platform" >"$work/log" 2>&1; then
+        said "$platform" "Python wheel" "$(cat "$work/log")"
+    else
+        failed "$platform" "Python wheel"
     fi
     for floor in "${floors[@]}"; do
         if "${emulate[@]}" "$build/test_$floor" --gtest_brief=1 >"$work/log" 2>&1; then
