@@ -14,10 +14,10 @@ elseif(HTVM_BUILD_TOOLS AND NOT HTVM_DRACO)
   message(FATAL_ERROR "The programs need Draco (libdraco-dev); HTVM_BUILD_TOOLS=OFF builds the libraries alone")
 endif()
 
-# Images and textures are apart (cmake/tools.cmake), so that the Python library, which reads meshes alone, needs none of
-# their libraries.
+# Images and textures are apart (cmake/tools.cmake), and the programs that read videos of them, so that the Python library,
+# which reads meshes alone, needs none of their libraries.
 file(GLOB io_sources CONFIGURE_DEPENDS src/io/*.cpp)
-list(FILTER io_sources EXCLUDE REGEX "/(image|texture)_[a-z]*\\.cpp$")
+list(FILTER io_sources EXCLUDE REGEX "/((image|texture)_[a-z]*|child_program)\\.cpp$")
 if(HTVM_DRACO)
   add_library(htvm_libdraco INTERFACE)
   target_include_directories(htvm_libdraco SYSTEM INTERFACE ${DRACO_INCLUDE})

@@ -89,6 +89,11 @@ set_tests_properties(bench PROPERTIES SKIP_RETURN_CODE 77)
 # Which folder includes which; and that this check, and the rest of ./dev check, find what they should.
 add_test(NAME floors COMMAND ${PROJECT_SOURCE_DIR}/tests/floors/check.py)
 add_test(NAME floors_check COMMAND python3 -B -m unittest discover -s ${PROJECT_SOURCE_DIR}/tests/floors -p *_test.py)
+# Programs that were linked with an earlier C library go on working with this one; and that this check finds what it should.
+if(TARGET htvm_c_shared)
+  add_test(NAME c_interface COMMAND ${PROJECT_SOURCE_DIR}/tests/abi/check.py $<TARGET_FILE:htvm_c_shared>)
+endif()
+add_test(NAME c_interface_check COMMAND ${PROJECT_SOURCE_DIR}/tests/abi/check.py --self-test)
 # Builds programs against an installation of this build.
 if(HTVM_INSTALL AND htvm_kinds STREQUAL "static;shared")
   add_test(NAME install COMMAND ${PROJECT_SOURCE_DIR}/tests/install/check.sh ${PROJECT_BINARY_DIR})

@@ -11,7 +11,7 @@ target_include_directories(htvm_image_formats SYSTEM INTERFACE ${TURBOJPEG_INCLU
 target_link_libraries(htvm_image_formats INTERFACE PNG::PNG ${TURBOJPEG_LIBRARY} ${WEBP_LIBRARY})
 find_package(embree 3 REQUIRED)
 
-file(GLOB image_sources CONFIGURE_DEPENDS src/io/image_*.cpp src/io/texture_*.cpp)
+file(GLOB image_sources CONFIGURE_DEPENDS src/io/image_*.cpp src/io/texture_*.cpp src/io/child_program.cpp)
 htvm_floor(images SOURCES ${image_sources} LINKS htvm_io htvm_image_formats)
 # Sound, likewise.
 find_package(PkgConfig REQUIRED)

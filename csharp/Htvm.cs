@@ -167,6 +167,20 @@ namespace Htvm
         public IntPtr Release;
     }
 
+    // The header of a packet.
+    [StructLayout(LayoutKind.Sequential)]
+    public struct PacketInfo
+    {
+        public uint StructSize;
+        public uint Kind;
+        public uint Flags;
+        public uint Frame;
+        public uint Reference;
+        public uint ReferenceVersion;
+        public long TimestampUs;
+        public ulong Bytes;
+    }
+
     // ---- functions of htvm.h ------------------------------------------------------------------------------------------
 
     public static class Native
@@ -207,6 +221,7 @@ namespace Htvm
         [DllImport(Library)] public static extern void htvm_decoder_destroy(IntPtr decoder);
         [DllImport(Library)] public static extern IntPtr htvm_decoder_last_error(IntPtr decoder);
         [DllImport(Library)] public static extern Status htvm_decoder_send_packet(IntPtr decoder, byte[] packet, UIntPtr size);
+        [DllImport(Library)] public static extern Status htvm_decoder_send_packet(IntPtr decoder, IntPtr packet, UIntPtr size);
         [DllImport(Library)] public static extern Status htvm_decoder_send_bytes(IntPtr decoder, byte[] bytes, UIntPtr size);
         [DllImport(Library)] public static extern Status htvm_decoder_receive_frame(IntPtr decoder, ref FrameInfo info, UIntPtr info_size);
         [DllImport(Library)] public static extern Status htvm_decoder_conceal(IntPtr decoder, uint frame, long timestamp_us, ref FrameInfo info, UIntPtr info_size);
@@ -229,6 +244,14 @@ namespace Htvm
         [DllImport(Library)] public static extern Status htvm_decoder_joint_name(IntPtr decoder, uint joint, byte[] name, UIntPtr capacity);
         [DllImport(Library)] public static extern Status htvm_decoder_bone(IntPtr decoder, uint bone, out uint first, out uint second, out double radius);
         [DllImport(Library)] public static extern Status htvm_decoder_metadata(IntPtr decoder, uint entry, byte[] key, UIntPtr key_capacity, byte[] value, UIntPtr value_capacity);
+
+        [DllImport(Library)] public static extern Status htvm_packet_read(IntPtr packet, UIntPtr size, ref PacketInfo info, UIntPtr info_size);
+        [DllImport(Library)] public static extern Status htvm_packet_header_read(IntPtr bytes, UIntPtr size, ref PacketInfo info, UIntPtr info_size);
+        [DllImport(Library)] public static extern Status htvm_dependencies_create(IntPtr allocator, out IntPtr dependencies);
+        [DllImport(Library)] public static extern void htvm_dependencies_destroy(IntPtr dependencies);
+        [DllImport(Library)] public static extern Status htvm_dependencies_push(IntPtr dependencies, ref PacketInfo info, out ulong place);
+        [DllImport(Library)] public static extern Status htvm_dependencies_kept(IntPtr dependencies, [Out] ulong[] places, UIntPtr capacity, out UIntPtr count);
+        [DllImport(Library)] public static extern Status htvm_dependencies_frame(IntPtr dependencies, out uint frame);
 
         [DllImport(Library)] public static extern Status htvm_encoder_options_create(Profile profile, IntPtr allocator, out IntPtr options);
         [DllImport(Library)] public static extern void htvm_encoder_options_destroy(IntPtr options);
@@ -341,6 +364,11 @@ namespace Htvm
             return Check(Native.htvm_decoder_send_packet(handle, packet, Native.Count(packet.Length))) == Status.Ok;
         }
 
+        public bool SendPacket(IntPtr packet, int size)
+        {
+            return Check(Native.htvm_decoder_send_packet(handle, packet, Native.Count(size))) == Status.Ok;
+        }
+
         // Decodes the next frame, which becomes the current one. False: none until more is sent. After an exception go on
         // calling: it cost one packet.
         public bool ReceiveFrame(out FrameInfo info)
@@ -432,14 +460,79 @@ namespace Htvm
         }
     }
 
-    // The frames of a stream, one after the other, in arrays that are used again for the next frame: they grow with the
-    // largest frame, and only their beginning, as long as the counts say, belongs to this one.
+    // A decoder's current frame in arrays that are used again for the next one: they grow with the largest frame, and only
+    // their beginning, as long as the counts say, belongs to this one.
+    public sealed class Frame
+    {
+        uint? topology, referenceTopology;
+
+        public FrameInfo Info { get; private set; }
+        public int VertexCount { get { return (int)Info.Vertices; } }
+        public int IndexCount { get { return 3 * (int)Info.Triangles; } }
+        // Whether triangles may differ from those of the frame taken before.
+        public bool TopologyChanged { get; private set; }
+        // Whether the vertices are others than in the frame taken before, and so may be texture coordinates.
+        public bool ReferenceChanged { get; private set; }
+        public float[] Positions = new float[0]; // 3 per vertex, mm
+        public int[] Indices = new int[0];       // 3 per triangle, counter-clockwise seen from outside
+        public byte[] Colours = new byte[0];     // 3 per vertex; valid if Info.Attributes has Attributes.Colours, and so on
+        public float[] Normals = new float[0];   // 3 per vertex
+        public float[] Texcoords = new float[0]; // 2 per vertex
+        public byte[] Presence = new byte[0];    // 1 per vertex: 0 where it is not there; valid if Info.Absent is not 0
+
+        // info: of the frame that the decoder has just received, always the same decoder.
+        public void Take(Decoder decoder, FrameInfo info)
+        {
+            Info = info;
+            TopologyChanged = topology != info.Topology;
+            topology = info.Topology;
+            ReferenceChanged = referenceTopology != info.ReferenceTopology;
+            referenceTopology = info.ReferenceTopology;
+            int vertices = VertexCount;
+            Grow(ref Positions, 3 * vertices);
+            decoder.CopyPositions(Positions);
+            if (TopologyChanged)
+            {
+                Grow(ref Indices, IndexCount);
+                decoder.CopyIndices(Indices);
+            }
+            if (Has(Attributes.Colours))
+            {
+                Grow(ref Colours, 3 * vertices);
+                decoder.CopyColours(Colours);
+            }
+            if (Has(Attributes.Normals))
+            {
+                Grow(ref Normals, 3 * vertices);
+                decoder.CopyNormals(Normals);
+            }
+            if (Has(Attributes.Texcoords) && ReferenceChanged)
+            {
+                Grow(ref Texcoords, 2 * vertices);
+                decoder.CopyTexcoords(Texcoords);
+            }
+            if (Info.Absent > 0)
+            {
+                Grow(ref Presence, vertices);
+                Marshal.Copy(decoder.View().Presence, Presence, 0, vertices);
+            }
+        }
+
+        public bool Has(Attributes attribute) { return (Info.Attributes & attribute) != 0; }
+
+        static void Grow<T>(ref T[] array, int count)
+        {
+            if (array.Length < count) array = new T[Math.Max(count, Math.Min(2 * array.Length, 1 << 28))];
+        }
+    }
+
+    // The frames of a stream, one after the other.
     public sealed class FrameReader : IDisposable
     {
         public readonly Decoder Decoder;
+        public readonly Frame Frame = new Frame(); // the one that Next has read
         readonly System.IO.Stream source;
         readonly byte[] piece = new byte[1 << 16];
-        uint? topology, referenceTopology;
         bool ended;
 
         // source: is disposed of with the reader. It may be a file, a socket's stream, or any other.
@@ -451,19 +544,19 @@ namespace Htvm
             Decoder = new Decoder(options);
         }
 
-        public FrameInfo Info { get; private set; }
-        public int VertexCount { get { return (int)Info.Vertices; } }
-        public int IndexCount { get { return 3 * (int)Info.Triangles; } }
-        // Whether triangles may differ from those of the frame before.
-        public bool TopologyChanged { get; private set; }
-        // Whether the vertices are others than in the frame before, and so may be texture coordinates.
-        public bool ReferenceChanged { get; private set; }
-        public float[] Positions = new float[0]; // 3 per vertex, mm
-        public int[] Indices = new int[0];       // 3 per triangle, counter-clockwise seen from outside
-        public byte[] Colours = new byte[0];     // 3 per vertex; valid if Info.Attributes has Attributes.Colours, and so on
-        public float[] Normals = new float[0];   // 3 per vertex
-        public float[] Texcoords = new float[0]; // 2 per vertex
-        public byte[] Presence = new byte[0];    // 1 per vertex: 0 where it is not there; valid if Info.Absent is not 0
+        // The frame's.
+        public FrameInfo Info { get { return Frame.Info; } }
+        public int VertexCount { get { return Frame.VertexCount; } }
+        public int IndexCount { get { return Frame.IndexCount; } }
+        public bool TopologyChanged { get { return Frame.TopologyChanged; } }
+        public bool ReferenceChanged { get { return Frame.ReferenceChanged; } }
+        public float[] Positions { get { return Frame.Positions; } }
+        public int[] Indices { get { return Frame.Indices; } }
+        public byte[] Colours { get { return Frame.Colours; } }
+        public float[] Normals { get { return Frame.Normals; } }
+        public float[] Texcoords { get { return Frame.Texcoords; } }
+        public byte[] Presence { get { return Frame.Presence; } }
+        public bool Has(Attributes attribute) { return Frame.Has(attribute); }
 
         // Reads the next frame. False at the end of the stream. An exception costs the packet that it is about: call
         // again for the frames behind it.
@@ -487,52 +580,8 @@ namespace Htvm
                         "{0} bytes of the stream are damaged, and {1} at its end are a packet cut short", damaged, pending));
                 return false;
             }
-            Info = info;
-            TopologyChanged = topology != info.Topology;
-            topology = info.Topology;
-            ReferenceChanged = referenceTopology != info.ReferenceTopology;
-            referenceTopology = info.ReferenceTopology;
-            Copy();
+            Frame.Take(Decoder, info);
             return true;
-        }
-
-        void Copy()
-        {
-            int vertices = VertexCount;
-            Grow(ref Positions, 3 * vertices);
-            Decoder.CopyPositions(Positions);
-            if (TopologyChanged)
-            {
-                Grow(ref Indices, IndexCount);
-                Decoder.CopyIndices(Indices);
-            }
-            if (Has(Attributes.Colours))
-            {
-                Grow(ref Colours, 3 * vertices);
-                Decoder.CopyColours(Colours);
-            }
-            if (Has(Attributes.Normals))
-            {
-                Grow(ref Normals, 3 * vertices);
-                Decoder.CopyNormals(Normals);
-            }
-            if (Has(Attributes.Texcoords) && ReferenceChanged)
-            {
-                Grow(ref Texcoords, 2 * vertices);
-                Decoder.CopyTexcoords(Texcoords);
-            }
-            if (Info.Absent > 0)
-            {
-                Grow(ref Presence, vertices);
-                Marshal.Copy(Decoder.View().Presence, Presence, 0, vertices);
-            }
-        }
-
-        public bool Has(Attributes attribute) { return (Info.Attributes & attribute) != 0; }
-
-        static void Grow<T>(ref T[] array, int count)
-        {
-            if (array.Length < count) array = new T[Math.Max(count, Math.Min(2 * array.Length, 1 << 28))];
         }
 
         public void Dispose()

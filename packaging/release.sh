@@ -28,6 +28,7 @@ packaging/debian_source.sh "$out/debian" >/dev/null
 awk -v heading="## $version" 'index($0, heading) == 1 { on = 1; print; next } /^## / { on = 0 } on' CHANGELOG.md >"$out/CHANGES.md"
 
 # C libraries: header, shared and static library.
+stripped=$(mktemp -d) # for the Unity package
 for build in package aarch64 windows; do
     library=$(find "build/$build/lib" -maxdepth 1 -type f \( -name 'libhtvm_c.so.*' -o -name 'libhtvm_c.dll' \) 2>/dev/null | head -1 || true)
     case $build in
@@ -55,8 +56,12 @@ for build in package aarch64 windows; do
             ln -s "$(basename "$library")" "$folder/lib/libhtvm_c.so" ;;
     esac
     pack "htvm-c-$version-$name" "$folder"
+    mkdir "$stripped/$build"
+    find "$folder/lib" -type f \( -name '*.so.*' -o -name '*.dll' \) -exec mv {} "$stripped/$build/" \;
     rm -r "$folder"
 done
+find "$stripped" -type f -print0 | LC_ALL=C sort -z | xargs -0 packaging/unity.py "$out" >/dev/null
+rm -r "$stripped"
 
 wheels=0
 for library in build/{package,release,aarch64,windows}/python/{libhtvm.so,libhtvm.dll}; do

@@ -29,7 +29,8 @@ def _text(data: bytes, at: int) -> str:
 
 
 def elf_needs(data: bytes) -> Tuple[str, List[str]]:
-    """The processor, and the shared libraries that a 64-bit ELF library needs."""
+    """The processor, and the shared libraries that a 64-bit ELF library needs. It may not look for them elsewhere than the
+    system does, nor be changed by the loader where it is code."""
     if data[4:6] != b"\2\1":
         raise Unfit("it is not for a 64-bit, little-endian processor")
     machine, = struct.unpack_from("<H", data, 18)
@@ -41,7 +42,13 @@ def elf_needs(data: bytes) -> Tuple[str, List[str]]:
         if kind == 6:  # SHT_DYNAMIC
             names = headers[link][4]
             entries = (struct.unpack_from("<QQ", data, at) for at in range(offset, offset + length, 16))
-            needed += [_text(data, names + value) for tag, value in entries if tag == 1]  # DT_NEEDED
+            for tag, value in entries:
+                if tag == 1:  # DT_NEEDED
+                    needed.append(_text(data, names + value))
+                elif tag in (15, 29):  # DT_RPATH, DT_RUNPATH
+                    raise Unfit(f"it looks for libraries in {_text(data, names + value)}")
+                elif tag == 22:  # DT_TEXTREL
+                    raise Unfit("its code is relocated: build it with -fPIC")
     if machine not in elf_machines:
         raise Unfit(f"there is no tag for ELF's machine {machine}")
     return elf_machines[machine], needed

@@ -1,8 +1,8 @@
-# The libraries that are headers alone (tl::expected, Eigen, nanoflann) serve builds for any system, but they lie beside
+# The libraries that are headers alone (tl::expected, Eigen, nanoflann, nlohmann-json) serve builds for any system, but they lie beside
 # this system's own headers, which do not: here they get a folder with nothing else in it.
 set(host_headers ${CMAKE_CURRENT_LIST_DIR}/../../build/host_headers)
 file(MAKE_DIRECTORY ${host_headers}/include ${host_headers}/lib/cmake/tl-expected)
-foreach(name tl nanoflann.hpp)
+foreach(name tl nanoflann.hpp nlohmann)
   if(EXISTS /usr/include/${name} AND NOT EXISTS ${host_headers}/include/${name})
     file(CREATE_LINK /usr/include/${name} ${host_headers}/include/${name} SYMBOLIC)
   endif()
@@ -14,4 +14,15 @@ file(WRITE ${host_headers}/lib/cmake/tl-expected/tl-expected-config.cmake
 endif()
 ")
 set(tl-expected_DIR ${host_headers}/lib/cmake/tl-expected CACHE PATH "Made by cmake/toolchains/host_headers.cmake")
+file(WRITE ${host_headers}/lib/cmake/nlohmann_json/nlohmann_json-config.cmake
+"if(NOT TARGET nlohmann_json::nlohmann_json)
+  add_library(nlohmann_json::nlohmann_json INTERFACE IMPORTED)
+  set_target_properties(nlohmann_json::nlohmann_json PROPERTIES INTERFACE_INCLUDE_DIRECTORIES \"${host_headers}/include\")
+endif()
+")
+file(WRITE ${host_headers}/lib/cmake/nlohmann_json/nlohmann_json-config-version.cmake
+"set(PACKAGE_VERSION 3.11)
+set(PACKAGE_VERSION_COMPATIBLE TRUE)
+")
+set(nlohmann_json_DIR ${host_headers}/lib/cmake/nlohmann_json CACHE PATH "Made by cmake/toolchains/host_headers.cmake")
 set(Eigen3_DIR /usr/share/eigen3/cmake CACHE PATH "Where Debian keeps it")

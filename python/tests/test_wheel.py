@@ -2,6 +2,7 @@
 
 import io
 import re
+import subprocess
 import sys
 import tarfile
 import zipfile
@@ -29,6 +30,20 @@ def test_the_tag_has_the_newest_version_of_the_c_library_that_is_needed():
 def test_a_library_that_needs_another_is_refused():
     with pytest.raises(Unfit, match="needs libz.so.6"):
         platform_tag(code.replace(b"\0libm.so.6\0", b"\0libz.so.6\0"))
+
+
+def test_a_library_that_looks_elsewhere_for_others_is_refused(tmp_path):
+    source = tmp_path / "empty.c"
+    source.write_text("")
+    build = ["cc", "-shared", "-fPIC", "-o", str(tmp_path / "it.so"), str(source)]
+    try:
+        subprocess.run(build, check=True)
+    except FileNotFoundError:
+        pytest.skip("there is no C compiler")
+    platform_tag((tmp_path / "it.so").read_bytes())
+    subprocess.run([*build, "-Wl,-rpath,/opt/elsewhere"], check=True)
+    with pytest.raises(Unfit, match="/opt/elsewhere"):
+        platform_tag((tmp_path / "it.so").read_bytes())
 
 
 @pytest.mark.parametrize("bytes_", [b"", b"a text", b"MZ" + bytes(100)])

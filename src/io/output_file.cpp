@@ -1,14 +1,13 @@
 #include "io/output_file.h"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstring>
 #include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
+
+#include "io/system_file.h"
 
 namespace htvm {
 namespace {
@@ -32,18 +31,10 @@ Error open_error(const fs::path& path, int reason) {
     return write_error(path.string(), reason);
 }
 
-// Where root replaces somebody's file, it stays theirs: a service that reads it again may not read root's.
-void keep_owner(const fs::path& from, const fs::path& to) {
-    struct stat was {};
-    if (geteuid() != 0 || stat(from.c_str(), &was) != 0) return;
-    [[maybe_unused]] const int kept = chown(to.c_str(), was.st_uid, was.st_gid);
-}
-
 }  // namespace
 
 Error write_error(std::string_view name, int reason) {
-    const bool full = reason == ENOSPC || reason == EDQUOT;
-    return {full ? ErrorKind::disk_full : ErrorKind::bad_input,
+    return {is_disk_full(reason) ? ErrorKind::disk_full : ErrorKind::bad_input,
             std::string(name) + " cannot be written: " + std::strerror(reason)};
 }
 
@@ -60,7 +51,7 @@ Result<OutputFile> OutputFile::create(const fs::path& path) {
     if (fs::is_directory(there)) return tl::unexpected(write_error(path.string(), EISDIR));
     if (!fs::exists(there) || fs::is_regular_file(there)) out.partial_ = out.path_.string() + ".partial";
     const auto& opened = out.partial_.empty() ? out.path_ : out.partial_;
-    out.file_.reset(std::fopen(opened.c_str(), "wb"));
+    out.file_.reset(open_file(opened, "wb"));
     if (!out.file_) return tl::unexpected(open_error(path, errno));
     if (!out.partial_.empty() && fs::exists(there)) {
         fs::permissions(out.partial_, there.permissions(), ignored);
@@ -85,7 +76,7 @@ Result<void> OutputFile::write(std::span<const std::uint8_t> bytes) {
 }
 
 Result<void> OutputFile::append(const fs::path& file) {
-    const std::unique_ptr<std::FILE, Close> in(std::fopen(file.c_str(), "rb"));
+    const std::unique_ptr<std::FILE, Close> in(open_file(file, "rb"));
     if (!in) return fail(ErrorKind::bad_input, file.string() + " cannot be read: " + std::strerror(errno));
     std::vector<std::uint8_t> piece(std::size_t{1} << 20);
     while (const auto bytes = std::fread(piece.data(), 1, piece.size(), in.get()))
@@ -101,16 +92,22 @@ Result<void> OutputFile::flush() {
 
 Result<void> OutputFile::sync() {
     if (auto ok = flush(); !ok) return ok;
-    if (::fsync(::fileno(file_.get())) != 0) return tl::unexpected(write_error(path_.string(), errno));
+    if (!write_through(file_.get())) return tl::unexpected(write_error(path_.string(), errno));
     return {};
 }
 
 Result<void> OutputFile::finish() {
     if (auto ok = flush(); !ok) return ok;
-    if (!partial_.empty() && std::rename(partial_.c_str(), path_.c_str()) != 0)
-        return tl::unexpected(write_error(path_.string(), errno));
+    if (partial_.empty()) {
+        file_.reset();
+        return {};
+    }
+    // Windows renames closed files alone.
     file_.reset();
-    return {};
+    if (replace_file(partial_, path_)) return {};
+    const auto error = write_error(path_.string(), errno);
+    file_.reset(open_file(partial_, "ab"));  // it can still be kept, or finished, and is removed if it is neither
+    return tl::unexpected(error);
 }
 
 Result<void> OutputFile::finish_behind(std::span<const std::uint8_t> front) {
@@ -118,7 +115,7 @@ Result<void> OutputFile::finish_behind(std::span<const std::uint8_t> front) {
     OutputFile whole;
     whole.path_ = path_;
     whole.partial_ = partial_.string() + ".whole";
-    whole.file_.reset(std::fopen(whole.partial_.c_str(), "wb"));
+    whole.file_.reset(open_file(whole.partial_, "wb"));
     if (!whole.file_) return tl::unexpected(write_error(path_.string(), errno));
     std::error_code ignored;
     fs::permissions(whole.partial_, fs::status(partial_, ignored).permissions(), ignored);

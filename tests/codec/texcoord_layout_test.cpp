@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "codec/encoder/tracking_numbers.h"
 #include "htvm/encoder.hpp"
@@ -70,7 +71,7 @@ Mesh column(int frame) {
     Mesh mesh;
     for (int ring = 0; ring <= rings; ++ring)
         for (int side = 0; side <= sides; ++side) {
-            const double angle = 2 * M_PI * side / sides, height = double(ring) / rings;
+            const double angle = 2 * std::numbers::pi * side / sides, height = double(ring) / rings;
             const double radius = 200 + 40 * std::sin(5 * height) + 20 * std::cos(3 * angle);
             mesh.positions.push_back(
                 {float(radius * std::cos(angle) + 4 * frame), float(1600 * height), float(radius * std::sin(angle))});

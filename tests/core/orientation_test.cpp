@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 
 namespace htvm::internal {
@@ -31,12 +32,12 @@ Vector3d random_vector(std::mt19937& random) {
 }
 
 Rotation about_z(double degrees) {
-    const double c = std::cos(degrees * M_PI / 180), s = std::sin(degrees * M_PI / 180);
+    const double c = std::cos(degrees * std::numbers::pi / 180), s = std::sin(degrees * std::numbers::pi / 180);
     return {c, -s, 0, s, c, 0, 0, 0, 1};
 }
 
 Rotation about_y(double degrees) {
-    const double c = std::cos(degrees * M_PI / 180), s = std::sin(degrees * M_PI / 180);
+    const double c = std::cos(degrees * std::numbers::pi / 180), s = std::sin(degrees * std::numbers::pi / 180);
     return {c, 0, s, 0, 1, 0, -s, 0, c};
 }
 

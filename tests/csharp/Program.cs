@@ -19,6 +19,7 @@ static class Program
         {
             case "interface": PrintInterface(); return 0;
             case "digests": PrintDigests(arguments[1]); return 0;
+            case "seeks": SeeksShowWhatPlayingShows(File.ReadAllBytes(arguments[1])); return 0;
             case "encode": EncodeAtDefaults(arguments[1], arguments[2]); return 0;
             default: RunTests(File.ReadAllBytes(arguments[1])); return 0;
         }
@@ -87,7 +88,9 @@ static class Program
         return Crc(crc, copy, bytes);
     }
 
-    static uint Digest(FrameReader frame)
+    static uint Digest(FrameReader reader) { return Digest(reader.Frame); }
+
+    static uint Digest(Frame frame)
     {
         uint crc = 0xFFFFFFFF;
         crc = Add(crc, frame.Positions, 12 * frame.VertexCount);
@@ -105,6 +108,24 @@ static class Program
             while (frame.Next())
                 Console.WriteLine("{0} {1} {2} {3} {4:x8}", frame.Info.Frame, kinds[(int)frame.Info.Type], frame.VertexCount,
                                   frame.IndexCount / 3, Digest(frame));
+    }
+
+    // Back and forth by steps that differ, from one decoder.
+    static void SeeksShowWhatPlayingShows(byte[] stream)
+    {
+        var expected = Digests(stream);
+        var random = new Random(1);
+        using (var film = new FrameFile(stream))
+        {
+            Require(film.FrameCount == expected.Count && film.DamagedBytes == 0, "all frames are found");
+            for (int n = 0; n < 3 * expected.Count; ++n)
+            {
+                int frame = n < expected.Count ? expected.Count - 1 - n : random.Next(expected.Count);
+                film.Show(frame);
+                Require(Digest(film.Frame) == expected[frame], "frame " + frame + " after a seek");
+                Require(film.FrameAt(film.TimeOf(frame)) >= frame, "it is found by its time");
+            }
+        }
     }
 
     // ---- the rest -----------------------------------------------------------------------------------------------------
@@ -137,7 +158,8 @@ static class Program
         LentArraysAreTheCopiedOnes(stream);
         WhatIsEncodedDecodes();
         WrongOptionsAreExceptions();
-        Console.WriteLine("{0} passed, 0 failed", 6);
+        SeekingGoesOnBehindDamage(stream);
+        Console.WriteLine("{0} passed, 0 failed", 7);
     }
 
     static void DamageIsAnExceptionBehindWhichReadingGoesOn(byte[] stream)
@@ -161,6 +183,30 @@ static class Program
         using (var frames = new FrameReader(new MemoryStream(stream)))
             while (frames.Next()) digests.Add(Digest(frames));
         return digests;
+    }
+
+    static void SeekingGoesOnBehindDamage(byte[] stream)
+    {
+        Fails(() => new FrameFile(new byte[5000]), Status.CorruptStream, "5000 bytes");
+        var expected = Digests(stream);
+        var damaged = (byte[])stream.Clone();
+        damaged[damaged.Length / 2] ^= 1;
+        using (var film = new FrameFile(damaged))
+        {
+            Require(film.FrameCount == expected.Count - 1 && film.DamagedBytes > 0, "one frame is lost");
+            int whole = 0;
+            for (int frame = 0; frame < film.FrameCount; ++frame)
+                try
+                {
+                    film.Show(frame);
+                    if (expected.Contains(Digest(film.Frame))) ++whole;
+                }
+                catch (HtvmException exception)
+                {
+                    Require(exception.Status == Status.CorruptStream, exception.Message);
+                }
+            Require(whole > 1, "the frames before the damage, and others");
+        }
     }
 
     static void ALimitIsAnException(byte[] stream)

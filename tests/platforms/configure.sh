@@ -12,5 +12,5 @@ case $platform in
     *) echo "there is no platform '$platform'; there are: aarch64 windows" >&2; exit 2 ;;
 esac
 cmake -G Ninja -S . -B "build/$platform" -DCMAKE_TOOLCHAIN_FILE=cmake/toolchains/$toolchain.cmake \
-    -DHTVM_BUILD_TOOLS=OFF -DHTVM_BUILD_BENCHMARKS=OFF -DHTVM_WERROR=ON -DHTVM_PRECOMPILED_HEADERS=all \
+    -DHTVM_BUILD_TOOLS=OFF -DHTVM_BUILD_PYTHON=ON -DHTVM_DRACO=OFF -DHTVM_BUILD_BENCHMARKS=OFF -DHTVM_WERROR=ON -DHTVM_PRECOMPILED_HEADERS=all \
     -DCMAKE_CXX_FLAGS_RELEASE=-O1 "$@" >/dev/null

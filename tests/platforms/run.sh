@@ -1,15 +1,20 @@
 #!/usr/bin/env bash
 # The decoder, the encoder and the C library, built by CMake for other processors and systems and run here by qemu and
 # Wine. Prints a line for each thing that was tried; fails unless all are well.
-#   tests/platforms/run.sh [--tests] [PLATFORM...]   PLATFORM: aarch64, windows; default both
-# --tests also runs the floors' tests, the codec's among them, which takes an hour on two cores.
+#   tests/platforms/run.sh [--tests[=FLOOR,...]] [PLATFORM...]   PLATFORM: aarch64, windows; default both
+# --tests also runs the tests of the floors named, by default of all that the libraries are made of; the codec's take an
+# hour on two cores. GTEST_FILTER chooses among them.
 # HTVM_ENCODED names this machine's own `encoded` (tests/digests/encoded.cpp), build/release/encoded if it does not.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-platforms=() tests=
+platforms=() floors=()
 for word in "$@"; do
-    if [ "$word" = --tests ]; then tests=yes; else platforms+=("$word"); fi
+    case $word in
+        --tests) floors=(core entropy surface c_api synth codec) ;;
+        --tests=*) IFS=, read -ra floors <<<"${word#*=}" ;;
+        *) platforms+=("$word") ;;
+    esac
 done
 [ ${#platforms[@]} -gt 0 ] || platforms=(aarch64 windows)
 streams=tests/data/conformance
@@ -42,8 +47,7 @@ exports() {
 
 try() {
     local platform=$1 emulate=(tests/platforms/emulate.sh "$1") build=build/$1 library floor
-    local targets=(digests encoded htvm_c_shared example_encode example_decode) floors=(core entropy surface c_api synth codec)
-    [ -z "$tests" ] || targets+=("${floors[@]/#/test_}")
+    local targets=(digests encoded htvm_c_shared htvm_python example_encode example_decode "${floors[@]/#/test_}")
     { tests/platforms/configure.sh "$platform" && cmake --build "$build" --target "${targets[@]}"; } >"$work/log" 2>&1 ||
         { failed "$platform" "build"; return; }
     if "${emulate[@]}" "$build/digests" 4 $streams/*.htvm >"$work/log"; then
@@ -71,7 +75,11 @@ try() {
     else
         said "$platform" "C library: exports htvm_* alone" "$(wc -l <"$work/exported") functions"
     fi
-    [ -n "$tests" ] || return 0
+    if tests/platforms/wheel.sh "$platform" >"$work/log" 2>&1; then
+        said "$platform" "Python wheel" "$(cat "$work/log")"
+    else
+        failed "$platform" "Python wheel"
+    fi
     for floor in "${floors[@]}"; do
         if "${emulate[@]}" "$build/test_$floor" --gtest_brief=1 >"$work/log" 2>&1; then
             said "$platform" "tests of $floor" "$(tail -1 "$work/log")"

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <numeric>
 #include <random>
 #include <set>
@@ -41,7 +42,7 @@ Input sphere(double radius, std::uint32_t rings, double shift = 0) {
     out.positions.emplace_back(shift, 0, radius);
     for (std::uint32_t ring = 1; ring < rings; ++ring)
         for (std::uint32_t i = 0; i < around; ++i) {
-            const double polar = M_PI * ring / rings, angle = 2 * M_PI * i / around;
+            const double polar = std::numbers::pi * ring / rings, angle = 2 * std::numbers::pi * i / around;
             out.positions.emplace_back(shift + radius * std::sin(polar) * std::cos(angle),
                                        radius * std::sin(polar) * std::sin(angle), radius * std::cos(polar));
         }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "core/thread.h"
 
@@ -27,7 +28,7 @@ Soup torus(std::uint32_t rows, std::uint32_t columns) {
     Soup soup;
     for (std::uint32_t r = 0; r < rows; ++r)
         for (std::uint32_t c = 0; c < columns; ++c) {
-            const double u = 2 * M_PI * r / rows, v = 2 * M_PI * c / columns;
+            const double u = 2 * std::numbers::pi * r / rows, v = 2 * std::numbers::pi * c / columns;
             soup.positions.emplace_back((3 + std::cos(v)) * std::cos(u), (3 + std::cos(v)) * std::sin(u), std::sin(v));
             const std::uint32_t a = r * columns + c, b = r * columns + (c + 1) % columns;
             const std::uint32_t d = (r + 1) % rows * columns + c, e = (r + 1) % rows * columns + (c + 1) % columns;
