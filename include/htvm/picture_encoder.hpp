@@ -1,6 +1,6 @@
 // Codes the pictures of a textured stream as video: AV1 by libaom, VP9 by libvpx. Each picture is coded as it comes,
 // without those that follow it, so that a live stream waits for nothing; or, for files, once so many that follow are
-// there, which halves the bits: what stays is then told from the noise of single pictures.
+// there, for a fifth fewer bits: what stays is then told from the noise of single pictures.
 //
 // Part of the library htvm::texture, which needs libaom, libvpx and libdav1d.
 //

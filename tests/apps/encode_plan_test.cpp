@@ -315,7 +315,7 @@ TEST(EncodePlan, GroupsOfFramesAreForFilesAlone) {
     EXPECT_EQ(plan(request).encoder.tracked.group, 8) << "the same stream as in a file";
 }
 
-TEST(Decisions, PicturesAreCodedByThoseThatFollowWhereNobodyWaitsAndTimeIsWorthLessThanBits) {
+TEST(EncodePlan, PicturesAreCodedByThoseThatFollowWhereNobodyWaitsAndTimeIsWorthLessThanBits) {
     const auto foresee = [](EncodeRequest request, double effort) {
         give(request, "tracked.effort", effort);
         return plan(request).pictures_foresee;
