@@ -5,21 +5,26 @@ SSIM.
 
 usage: textures.py [options] HTVM CAPTURE
 
-- htvm: --texture-as picture at several qualities (or what --as says);
+- htvm: --texture-as picture (or what --as says) at several qualities, and with the options of each --row;
 - Draco, level 10, a frame, at several numbers of bits, with the capture's images as AV1, as they came, by the same coder;
 - the same with JPEG images of several qualities.
 
-Rates in Mbit/s at --fps. Draco is the programs draco_encoder and draco_decoder; JPEG is ffmpeg's.
+Rates in Mbit/s at --fps; seconds a frame are of htvm encode. Draco is the programs draco_encoder and draco_decoder; JPEG
+is ffmpeg's.
   --as WORD            picture, captured (default picture)
-  -q A,B,...           qualities of htvm (default 20,42,60)
-  --draco P/T/N,...    bits of positions, texture coordinates and normals; 0: none are sent (default 11/12/8)
+  -q A,B,...           qualities of htvm; empty: the rows alone (default 42,55,65,80,100)
+  --row='OPTIONS'      for htvm encode, in one word: --row='--preset web' --row='-q 42 --effort 6'; may be given several times
+  --draco P/T/N,...    bits of positions, texture coordinates and normals; 0: none are sent; empty: htvm alone (default
+                       10/11/0,11/12/8)
   --av1 A,B,...        --texture-quality of the images as they came, or 10@512, made smaller before (default 10,30,50,70)
   --jpeg A,B,...       ffmpeg's -q:v, from 2, the finest, to 31 (default 4,10)
   --frames N           (default 30)
   --fps N              (default 30)
-  --with OPTIONS       for htvm encode, in one word
-  --views N            sides that pictures are rendered from (default 3)
-  --every N            frames are measured that are so many apart (default 1)
+  --with OPTIONS       for htvm encode, in one word, in every row
+  --views N --width N --height N    of the pictures that are compared (default 4, 900, 1200)
+  --up AXIS            where the head is (default y)
+  --every N            frames are measured that are so many apart (default 6)
+  --keep FOLDER        keeps htvm's streams there
 """
 import argparse
 import json
@@ -28,6 +33,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../tests/second_decoder"))
 from compare import read_ply  # noqa: E402
@@ -35,7 +41,7 @@ from compare import read_ply  # noqa: E402
 
 def run(*command):
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-    if done.returncode != 0:
+    if done.returncode not in (0, 5):  # 5: a bitrate was missed
         sys.exit("%s\n%s" % (" ".join(map(str, command)), done.stderr))
     return done.stdout
 
@@ -45,10 +51,11 @@ def words(text):
 
 
 class Point:
-    def __init__(self, name, bytes_of_all, bytes_of_pictures, quality, seconds):
+    def __init__(self, name, bytes_of_all, bytes_of_pictures, quality, seconds, pixels="", taken=""):
         self.name, (self.psnr, self.ssim) = name, quality
         self.all, self.pictures = (8e-6 * count / seconds for count in (bytes_of_all, bytes_of_pictures))
-        print("| %s | %.3f | %.3f | %.2f | %.4f |" % (name, self.all, self.pictures, self.psnr, self.ssim), flush=True)
+        print("| %s | %.3f | %.3f | %s | %.2f | %.4f | %s |" % (
+            name, self.all, self.pictures, pixels, self.psnr, self.ssim, taken), flush=True)
 
 
 def least(points, wanted, quality, rate):
@@ -79,30 +86,35 @@ def main():
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("htvm")
     parser.add_argument("capture")
+    parser.add_argument("--row", dest="rows", action="append", default=[])
     parser.add_argument("--as", dest="layout", default="picture")
-    parser.add_argument("-q", default="20,42,60")
-    parser.add_argument("--draco", default="11/12/8")
+    parser.add_argument("-q", default="42,55,65,80,100")
+    parser.add_argument("--draco", default="10/11/0,11/12/8")
     parser.add_argument("--av1", default="10,30,50,70")
     parser.add_argument("--jpeg", default="4,10")
     parser.add_argument("--frames", type=int, default=30)
     parser.add_argument("--fps", type=float, default=30)
     parser.add_argument("--with", dest="extra", default="")
-    parser.add_argument("--views", type=int, default=3)
-    parser.add_argument("--every", type=int, default=1)
+    parser.add_argument("--views", type=int, default=4)
+    parser.add_argument("--width", type=int, default=900)
+    parser.add_argument("--height", type=int, default=1200)
+    parser.add_argument("--up", default="y")
+    parser.add_argument("--every", type=int, default=6)
+    parser.add_argument("--keep")
     given = parser.parse_args()
     htvm, capture, frames = given.htvm, given.capture, given.frames
     seconds = frames / given.fps
 
     def m3(decoded):
-        said = json.loads(run(htvm, "compare", measured, decoded, "--frames", frames, "--only", "m3", "--views",
-                              given.views, "--json"))
+        said = json.loads(run(htvm, "compare", measured, decoded, "--frames", frames, "--only", "m3", "--views", given.views,
+                              "--width", given.width, "--height", given.height, "--up=" + given.up, "--json"))
         unlit = said["sequence"]["m3_unlit"]
         return unlit["foreground_db"], unlit["ssim"]
 
     def point(name, bytes_of_all, bytes_of_pictures, quality):
         return Point(name, bytes_of_all, bytes_of_pictures, quality, seconds)
 
-    print("| | all, Mbit/s | of it pictures | M3, dB | SSIM |\n|---|---|---|---|---|")
+    print("| | all, Mbit/s | of it pictures | pixels | M3, dB | SSIM | s a frame |\n|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as work:
         stream, measured = os.path.join(work, "stream.htvm"), os.path.join(work, "measured")
         meshes = sorted(name for name in os.listdir(capture) if name.endswith((".drc", ".ply", ".obj")))[:frames]
@@ -116,16 +128,27 @@ def main():
 
         def info():
             said = json.loads(run(htvm, "info", stream, "--json"))
-            return said["bytes"], said["pictures"]["bytes"]
+            pictures = said.get("pictures") or {}
+            width = (pictures.get("kinds") or [pictures])[0].get("width", "-")
+            return said["bytes"], pictures.get("bytes", 0), width
 
         profile = ["--profile", "topology"] if given.layout == "captured" else []
         decoded, ours = os.path.join(work, "decoded"), []
-        for quality in words(given.q):
-            run(htvm, "encode", capture, "--frames", frames, "--fps", given.fps, "--texture-as", given.layout, "-q",
-                quality, *profile, *given.extra.split(), "-o", stream)
+        for row in ["-q " + quality for quality in words(given.q)] + given.rows:
+            if given.keep:
+                stream = os.path.join(given.keep, "%s.htvm" % "_".join(row.replace("-", "").split()))
+            start = time.monotonic()
+            use = [] if "--texture-as" in row else ["--texture-as", given.layout]
+            run(htvm, "encode", capture, "--frames", frames, "--fps", given.fps, *use, *row.split(), *profile,
+                *given.extra.split(), "-o", stream)
+            taken = "%.2f" % ((time.monotonic() - start) / frames)
             run(htvm, "decode", stream, "-o", decoded)
-            ours.append(point("htvm -q %s" % quality, *info(), m3(decoded)))
+            count, of_pictures, width = info()
+            ours.append(Point("htvm " + row, count, of_pictures, m3(decoded), seconds, width, taken))
             shutil.rmtree(decoded)
+        if not given.draco:
+            return
+        stream = os.path.join(work, "stream.htvm")
 
         # The capture's meshes by Draco, of which a folder has one and an image each.
         draco = {bits: os.path.join(work, "draco" + bits.replace("/", "_")) for bits in words(given.draco)}

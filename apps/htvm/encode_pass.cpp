@@ -21,19 +21,27 @@ Result<void> write(Pass& pass, Packet packet) {
     return written;
 }
 
+Result<void> hand_out(Pass& pass, std::vector<Packet> packets) {
+    for (auto& packet : packets) {
+        pass.rate.buffer.add(packet);
+        if (auto written = write(pass, std::move(packet)); !written) return written;
+    }
+    return {};
+}
+
 Result<void> drain(Pass& pass) {
     while (auto packet = pass.encoder.pull()) {
-        pass.rate.buffer.add(*packet);
-        if (!pass.write) continue;
-        const PacketHeader header = *packet;
-        const auto bytes = packet->payload.size() + packet_overhead;
-        if (auto written = write(pass, std::move(*packet)); !written) return written;
-        if (!pass.pictures) continue;
-        auto picture = pass.pictures->behind(header, bytes);
-        if (!picture) return tl::unexpected(picture.error());
-        if (!*picture) continue;
-        pass.rate.buffer.add(**picture);
-        if (auto written = write(pass, std::move(**picture)); !written) return written;
+        if (!pass.write) {
+            pass.rate.buffer.add(*packet);
+            continue;
+        }
+        Result<std::vector<Packet>> ready;
+        if (pass.pictures)
+            ready = pass.pictures->lay_behind(std::move(*packet));
+        else
+            ready->push_back(std::move(*packet));
+        if (!ready) return tl::unexpected(ready.error());
+        if (auto handed = hand_out(pass, std::move(*ready)); !handed) return handed;
     }
     return {};
 }
@@ -331,6 +339,7 @@ Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const 
     out.frames_per_second = capture.fps();
     if (!quality) out.bits_per_second = plan.encoder.rate.bits_per_second;  // of all; the settings have the meshes'
     out.buffer_seconds = settings.rate.buffer_seconds;
+    out.foresees = plan.pictures_foresee;
     out.threads = settings.threads;
     auto track = PictureTrack::create(out);
     if (!track) return tl::unexpected(track.error());
@@ -361,7 +370,10 @@ Result<void> finish(Pass& pass) {
     }
     pass.summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!finished) return finished;
-    return pass.encoder.coded_frames().empty() ? drain(pass) : take_coded(pass);
+    if (auto taken = pass.encoder.coded_frames().empty() ? drain(pass) : take_coded(pass); !taken) return taken;
+    if (!pass.pictures || !pass.write) return {};
+    auto rest = pass.pictures->finish();
+    return rest ? hand_out(pass, std::move(*rest)) : tl::unexpected(rest.error());
 }
 
 }  // namespace htvm::app

@@ -242,12 +242,19 @@ Result<Floor> floor_of(const std::string& text) {
 
 // Below it, time is worth more than bits.
 constexpr int least_effort_with_groups = 3;
+// Pictures coded by those that follow take several times as long.
+constexpr int least_effort_with_foresight = 6;
 
 // What the highest effort takes; 0 where there may be no groups.
 int largest_group(EncoderOptions options) {
     options.tracked.effort = 9;
     const int frames = frames_in_group(options);
     return frames > 1 ? frames : 0;
+}
+
+// Nobody waits for the frames of a file.
+bool is_of_files(const EncodeRequest& request) {
+    return !is_piped(request.capture) && !may_not_wait(request) && request.effort_log.empty();
 }
 
 // The library's options, with what the command takes in place of its defaults.
@@ -259,8 +266,7 @@ EncoderOptions encoder_of(const EncodeRequest& request, const Destination& outpu
     if (out.tracked.group == 0 && (may_not_wait(request) || is_paced(request))) out.tracked.group = 1;
     // A first frame that takes seconds is none to be watched live.
     if (!given(request, "tracked.levels") && may_not_wait(request)) out.tracked.levels = ReferenceLevels::off;
-    // Nobody waits for the frames of a file.
-    const bool of_files = !is_piped(request.capture) && !may_not_wait(request) && request.effort_log.empty();
+    const bool of_files = is_of_files(request);
     if (!given(request, "latency_frames") && of_files && !output.may_be_live()) out.latency_frames = 1;
     if (of_files && out.tracked.group == 0 && out.tracked.effort >= least_effort_with_groups)
         out.tracked.group = largest_group(out);
@@ -305,6 +311,8 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     plan.audio = request.audio;
     plan.pictures = request.pictures;
     plan.encoder = encoder_of(request, plan.output);
+    plan.pictures_foresee = is_of_files(request) && !plan.output.may_be_live() &&
+                            plan.encoder.tracked.effort >= least_effort_with_foresight;
     // A key picture takes as many bits as a second of others.
     constexpr int frames_between_key_pictures = 90;
     plan.access_interval_with_pictures =

@@ -80,6 +80,7 @@ struct EncodePlan {
     PublishingOptions publishing;  // where the output is a hub
     AudioOptions audio;
     TexturePictureOptions pictures;  // where the capture's images go into the stream
+    bool pictures_foresee = false;   // nobody waits, and bits are worth the time
 
     EncoderOptions encoder;  // all but what the capture says: its rate, unit, axes, skeleton, radii, texture
     int access_interval_with_pictures = 0;  // frames, in place of the encoder's, where pictures are drawn anew

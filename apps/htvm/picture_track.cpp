@@ -15,6 +15,9 @@
 namespace htvm::app {
 namespace {
 
+// So many pictures follow before one is coded: what is gained by more is little.
+constexpr int foresight = 19;
+
 constexpr std::array<std::uint16_t, 3> no_gains = {picture_gain_one, picture_gain_one, picture_gain_one};
 
 // Where who watches may start without the frames before: there pictures start too. Not where such frames are many, as
@@ -95,6 +98,8 @@ Result<PictureTrack> PictureTrack::create(const Settings& settings) {
     out.set_ = options.bits_per_second;
     options.buffer_seconds = settings.buffer_seconds;
     options.threads = settings.threads;
+    if (settings.foresees && out.coder_ == PictureCoder::av1 && options.bits_per_second == 0)
+        options.foresight = foresight;
     auto encoder = PictureEncoder::create(options);
     if (!encoder) return tl::unexpected(encoder.error());
     out.encoder_.emplace(std::move(*encoder));
@@ -120,65 +125,102 @@ Result<void> PictureTrack::follow_meshes(std::size_t bytes) {
     return encoder_->set_bitrate(left);
 }
 
-Result<std::optional<Packet>> PictureTrack::behind(const PacketHeader& packet, std::size_t bytes) {
-    if (!frame_type(packet.kind)) return std::nullopt;
+Result<std::vector<Packet>> PictureTrack::lay_behind(Packet packet) {
+    held_.push_back({std::move(packet)});
+    if (frame_type(held_.back().packet.kind))
+        if (auto added = add_picture(held_.back()); !added) return tl::unexpected(added.error());
+    return give_ready();
+}
+
+Result<std::vector<Packet>> PictureTrack::finish() {
     if (encoder_)
-        if (auto followed = follow_meshes(bytes); !followed) return tl::unexpected(followed.error());
+        if (auto finished = encoder_->finish(); !finished) return tl::unexpected(finished.error());
+    return give_ready();
+}
+
+Result<void> PictureTrack::add_picture(Held& held) {
+    const auto& packet = held.packet;
+    if (encoder_)
+        if (auto followed = follow_meshes(packet_overhead + packet.payload.size()); !followed) return followed;
     // Those of frames that were dropped go.
     while (!waiting_.empty() && waiting_.front().timestamp_us < packet.timestamp_us) waiting_.pop_front();
-    if (waiting_.empty() || waiting_.front().timestamp_us != packet.timestamp_us) return std::nullopt;
+    if (waiting_.empty() || waiting_.front().timestamp_us != packet.timestamp_us) return {};
     const auto captured = std::move(waiting_.front().textured);
     waiting_.pop_front();
     const bool key = is_start(packet, last_key_) || !last_;
-    if (!captured->texture || (!baker_ && captured->texture == last_ && !key)) return std::nullopt;
+    if (!captured->texture || (!baker_ && captured->texture == last_ && !key)) return {};
     const auto start = std::chrono::steady_clock::now();
     const double baking = totals_.baking_seconds;
-    auto coded = baker_     ? baked(packet, *captured, key)
-                 : encoder_ ? coded_as_video(packet, *captured->texture, no_gains, key)
-                            : kept_file(packet, *captured);
+    if (baker_) {
+        if (auto drawn = draw(held, *captured, key); !drawn) return drawn;
+    } else if (encoder_) {
+        if (auto coded = code_as_video(held, *captured->texture, no_gains, key); !coded) return coded;
+    } else {
+        auto kept = kept_file(packet, *captured);
+        if (!kept) return tl::unexpected(kept.error());
+        held.picture.emplace(std::move(*kept));
+    }
     totals_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
                        (totals_.baking_seconds - baking);
-    if (!coded) return tl::unexpected(coded.error());
     last_ = captured->texture;
-    last_number_ = packet.frame;
-    ++totals_.pictures;
-    totals_.key_pictures += is_key_picture(*coded) ? 1 : 0;
-    if (is_key_picture(*coded)) last_key_ = packet.frame;
-    totals_.bytes += packet_overhead + coded->payload.size();
-    return std::optional(std::move(*coded));
+    if (key || !encoder_) last_key_ = packet.frame;
+    return {};
+}
+
+// Packets up to the first whose picture is not coded.
+std::vector<Packet> PictureTrack::give_ready() {
+    std::vector<Packet> out;
+    for (; !held_.empty(); held_.pop_front()) {
+        auto& [packet, being_coded, picture] = held_.front();
+        if (being_coded) {
+            auto coded = encoder_->pull();
+            if (!coded) break;
+            picture.emplace(packet_of(packet, *being_coded, std::move(*coded)));
+        }
+        out.push_back(std::move(packet));
+        if (!picture) continue;
+        ++totals_.pictures;
+        totals_.key_pictures += is_key_picture(*picture) ? 1 : 0;
+        totals_.bytes += packet_overhead + picture->payload.size();
+        out.push_back(std::move(*picture));
+    }
+    return out;
 }
 
 // The captured texture, drawn in the layout of the mesh that is shown.
-Result<Packet> PictureTrack::baked(const PacketHeader& frame, const TexturedMesh& captured, bool key) {
+Result<void> PictureTrack::draw(Held& held, const TexturedMesh& captured, bool key) {
     const auto start = std::chrono::steady_clock::now();
-    const auto found = shown_.find(frame.frame);
+    const auto found = shown_.find(held.packet.frame);
     if (found == shown_.end()) return fail(ErrorKind::bad_input, "nothing is shown of a frame that has a texture");
     const auto shown = std::move(found->second);
     shown_.erase(shown_.begin(), std::next(found));
     auto drawn = baker_->bake(captured, shown.mesh, shown.repeated);
     totals_.baking_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!drawn) return tl::unexpected(drawn.error());
-    std::array<std::uint16_t, 3> gains{};
+    Gains gains{};
     for (std::size_t k = 0; k < 3; ++k)
         gains[k] = static_cast<std::uint16_t>(std::clamp(std::lround(drawn->gains[k] * picture_gain_one), 1L, 65535L));
-    return coded_as_video(frame, drawn->picture, gains, key);
+    return code_as_video(held, drawn->picture, gains, key);
 }
 
-Result<Packet> PictureTrack::coded_as_video(const PacketHeader& frame, const Image& image,
-                                            const std::array<std::uint16_t, 3>& gains, bool key) {
+Result<void> PictureTrack::code_as_video(Held& held, const Image& image, const Gains& gains, bool key) {
     const auto width = static_cast<int>(width_), height = static_cast<int>(height_);
     const bool fits = image.width == width && image.height == height;
     const OwnPlanes planes(fits ? image : resized(image, width, height));
-    const auto coded = encoder_->encode(planes.view(), key);
-    if (!coded) return tl::unexpected(coded.error());
+    held.being_coded = gains;
+    return encoder_->push(planes.view(), key);
+}
+
+Packet PictureTrack::packet_of(const PacketHeader& frame, const Gains& gains, CodedPicture coded) {
+    const auto reference = coded.key ? frame.frame : *last_number_;
+    last_number_ = frame.frame;
     TexturePicture out;
     out.coder = coder_;
     out.width = width_;
     out.height = height_;
     out.gains = gains;
-    out.coded = coded->bytes;
-    return write_texture_picture(
-        out, {frame.frame, coded->key ? frame.frame : *last_number_, frame.timestamp_us, /*referred=*/true});
+    out.coded = std::move(coded.bytes);
+    return write_texture_picture(out, {frame.frame, reference, frame.timestamp_us, /*referred=*/true});
 }
 
 Result<Packet> PictureTrack::kept_file(const PacketHeader& frame, const TexturedMesh& captured) const {

@@ -60,7 +60,8 @@ struct PictureTotals {
     double baking_seconds = 0;
 };
 
-// Takes the picture of each frame that goes into the encoder of meshes, and gives it out behind that frame's packet.
+// Takes the picture of each frame that goes into the encoder of meshes, and lays it behind that frame's packet. With
+// foresight packets wait for their pictures.
 class PictureTrack {
 public:
     // Pictures have one size, which images of others are brought to. With keep, files go as they are. bits_per_second:
@@ -72,6 +73,7 @@ public:
         int width = 0, height = 0;  // of the pictures
         double quality = 50, frames_per_second = 30;
         double bits_per_second = 0, buffer_seconds = 1;
+        bool foresees = false;  // pictures may be coded by those that follow, where the coder can
         unsigned threads = 0;
     };
     static Result<PictureTrack> create(const Settings& settings);
@@ -84,9 +86,12 @@ public:
     void show(std::uint32_t frame, Mesh mesh, std::vector<std::uint32_t> repeated) {
         shown_[frame] = {std::move(mesh), std::move(repeated)};
     }
-    // What comes behind a packet of the stream, of which it takes every one, in order: nothing where the picture is the
-    // one before, and the frame none to start at. bytes: of the packet; what these leave of the rate, pictures take.
-    Result<std::optional<Packet>> behind(const PacketHeader& packet, std::size_t bytes);
+    // Takes every packet of the stream, in order, and gives those that are ready, each with its picture behind it: none
+    // where the picture is the one before, and the frame none to start at. What packets leave of the rate, pictures
+    // take.
+    Result<std::vector<Packet>> lay_behind(Packet packet);
+    // No more packets come: gives what waits.
+    Result<std::vector<Packet>> finish();
     // The rate of all, from the next picture on.
     void set_bitrate(double bits_per_second) { bits_per_second_ = bits_per_second; }
     const PictureTotals& totals() const { return totals_; }
@@ -100,12 +105,21 @@ private:
         Mesh mesh;
         std::vector<std::uint32_t> repeated;
     };
+    using Gains = std::array<std::uint16_t, 3>;
+    // A packet of the stream that is not yet given out.
+    struct Held {
+        Packet packet;
+        std::optional<Gains> being_coded = {};  // of the picture that the encoder of pictures has
+        std::optional<Packet> picture = {};
+    };
     PictureTrack() = default;
     Result<void> follow_meshes(std::size_t bytes);
-    Result<Packet> baked(const PacketHeader& frame, const TexturedMesh& captured, bool key);
-    Result<Packet> coded_as_video(const PacketHeader& frame, const Image& image,
-                                  const std::array<std::uint16_t, 3>& gains, bool key);
+    Result<void> add_picture(Held& held);
+    Result<void> draw(Held& held, const TexturedMesh& captured, bool key);
+    Result<void> code_as_video(Held& held, const Image& image, const Gains& gains, bool key);
     Result<Packet> kept_file(const PacketHeader& frame, const TexturedMesh& captured) const;
+    Packet packet_of(const PacketHeader& frame, const Gains& gains, CodedPicture coded);
+    std::vector<Packet> give_ready();
 
     std::uint32_t width_ = 0, height_ = 0;
     PictureCoder coder_ = PictureCoder::av1;
@@ -113,6 +127,7 @@ private:
     std::optional<TextureBaker> baker_;
     std::map<std::uint32_t, Shown> shown_;
     std::deque<Waiting> waiting_;
+    std::deque<Held> held_;
     std::shared_ptr<const Image> last_;         // that was coded
     std::optional<std::uint32_t> last_number_;  // of its frame
     std::optional<std::uint32_t> last_key_;     // of the last key picture's

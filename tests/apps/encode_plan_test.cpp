@@ -315,6 +315,18 @@ TEST(EncodePlan, GroupsOfFramesAreForFilesAlone) {
     EXPECT_EQ(plan(request).encoder.tracked.group, 8) << "the same stream as in a file";
 }
 
+TEST(EncodePlan, PicturesAreCodedByThoseThatFollowWhereNobodyWaitsAndTimeIsWorthLessThanBits) {
+    const auto foresee = [](EncodeRequest request, double effort) {
+        give(request, "tracked.effort", effort);
+        return plan(request).pictures_foresee;
+    };
+    EXPECT_FALSE(plan(usual()).pictures_foresee);
+    EXPECT_FALSE(foresee(usual(), 5));
+    EXPECT_TRUE(foresee(usual(), 6));
+    EXPECT_FALSE(foresee(to_hub(), 6));
+    EXPECT_FALSE(foresee(piped(), 6));
+}
+
 TEST(EncodePlan, FilesAreInGroupsWhereTheyMayBeAndTimeIsNotWorthMoreThanBits) {
     const auto group_with = [](const char* option, double value) {
         auto request = usual();

@@ -42,25 +42,37 @@ PictureEncoderOptions small(PictureCoder coder) {
     return out;
 }
 
+Packet packet_of(const PictureEncoderOptions& options, const CodedPicture& picture, std::uint32_t frame) {
+    TexturePicture written;
+    written.coder = options.coder;
+    written.width = options.width;
+    written.height = options.height;
+    written.coded = picture.bytes;
+    return write_texture_picture(written, {frame, picture.key ? frame : frame - 1, 1000 * frame, true});
+}
+
 // Packets of so many pictures, those in `keys` being key pictures.
-std::vector<Packet> coded(const PictureEncoderOptions& options, int pictures, const std::vector<int>& keys = {}) {
+std::vector<Packet> coded(const PictureEncoderOptions& options, int pictures, const std::vector<int>& keys = {},
+                          Image (*picture_at)(int, int, int) = waves) {
     auto encoder = PictureEncoder::create(options);
     EXPECT_TRUE(encoder) << encoder.error().message;
     std::vector<Packet> out;
+    const auto is_key = [&](std::size_t i) { return i == 0 || std::count(keys.begin(), keys.end(), i) > 0; };
+    const auto take = [&] {
+        while (const auto picture = encoder->pull()) {
+            EXPECT_EQ(picture->key, is_key(out.size()));
+            out.push_back(packet_of(options, *picture, static_cast<std::uint32_t>(out.size())));
+        }
+    };
     for (int i = 0; i < pictures; ++i) {
-        const bool key = std::find(keys.begin(), keys.end(), i) != keys.end();
-        const auto picture = encoder->encode(
-            OwnPlanes(waves(i, static_cast<int>(options.width), static_cast<int>(options.height))).view(), key);
-        EXPECT_TRUE(picture) << picture.error().message;
-        EXPECT_EQ(picture->key, key || i == 0);
-        TexturePicture written;
-        written.coder = options.coder;
-        written.width = options.width;
-        written.height = options.height;
-        written.coded = picture->bytes;
-        const auto frame = static_cast<std::uint32_t>(i);
-        out.push_back(write_texture_picture(written, {frame, picture->key ? frame : frame - 1, 1000 * i, true}));
+        const OwnPlanes planes(picture_at(i, static_cast<int>(options.width), static_cast<int>(options.height)));
+        const auto pushed = encoder->push(planes.view(), is_key(static_cast<std::size_t>(i)));
+        EXPECT_TRUE(pushed) << pushed.error().message;
+        take();
+        EXPECT_GE(static_cast<int>(out.size()), i + 1 - 2 * options.foresight);
     }
+    EXPECT_TRUE(encoder->finish());
+    take();
     return out;
 }
 
@@ -207,6 +219,88 @@ TEST_P(PictureCoding, WhatIsLargerThanAllowedIsRefusedBeforeItIsDecoded) {
     picture.coded = bytes;
     picture.width = picture.height = 64;
     EXPECT_FALSE(decoder.decode(write_texture_picture(picture, {})));
+}
+
+// What stays, below noise that is another in every picture.
+Image noisy_waves(int number, int w, int h) {
+    auto out = waves(0, w, h);
+    std::uint32_t random = static_cast<std::uint32_t>(number) + 1;
+    for (auto& level : out.rgb) {
+        random = random * 1664525u + 1013904223u;
+        const int changed = level + static_cast<int>(random >> 24) % 17 - 8;
+        level = static_cast<std::uint8_t>(std::clamp(changed, 0, 255));
+    }
+    return out;
+}
+
+PictureEncoderOptions foreseeing(int pictures) {
+    auto out = small(PictureCoder::av1);
+    out.foresight = pictures;
+    return out;
+}
+
+TEST(PicturesWithForesight, ComeBackInTheirOrderEachByThoseBeforeIt) {
+    PictureDecoder decoder;
+    int i = 0;
+    for (const auto& packet : coded(foreseeing(6), 20, {9, 10})) {
+        const auto taken = decoder.decode(packet);
+        ASSERT_TRUE(taken) << taken.error().message;
+        EXPECT_GT(psnr(*decoder.image(), waves(i++)), 32) << i;
+    }
+    EXPECT_EQ(i, 20);
+}
+
+TEST(PicturesWithForesight, AreDecodedFromALaterKeyPictureOn) {
+    const auto packets = coded(foreseeing(6), 16, {9});
+    PictureDecoder decoder;
+    EXPECT_FALSE(decoder.decode(packets[4]));
+    for (std::size_t i = 9; i < packets.size(); ++i) {
+        const auto taken = decoder.decode(packets[i]);
+        ASSERT_TRUE(taken) << taken.error().message;
+        EXPECT_GT(psnr(*decoder.image(), waves(static_cast<int>(i))), 32);
+    }
+}
+
+TEST(PicturesWithForesight, ShowWhatStaysBelowNoiseBetterAndTakeFewerBits) {
+    const auto cost = [](PictureEncoderOptions options) {
+        options.quantiser = 45;
+        PictureDecoder decoder;
+        std::pair<std::size_t, double> out{0, 0};  // bytes, mean dB against what has no noise
+        for (const auto& packet : coded(options, 24, {}, noisy_waves)) {
+            EXPECT_TRUE(decoder.decode(packet));
+            out.first += packet.payload.size();
+            out.second += psnr(*decoder.image(), waves(0)) / 24;
+        }
+        return out;
+    };
+    const auto [bytes, error] = cost(small(PictureCoder::av1));
+    const auto [bytes_foreseen, error_foreseen] = cost(foreseeing(19));
+    EXPECT_LT(bytes_foreseen, bytes);
+    EXPECT_GT(error_foreseen, error + 1);
+}
+
+TEST(PicturesWithForesight, AreTheSameForAnyNumberOfThreads) {
+    auto options = foreseeing(8);
+    options.width = options.height = 256;
+    std::vector<std::vector<std::uint8_t>> payloads[2];
+    for (const unsigned threads : {1u, 4u}) {
+        options.threads = threads;
+        for (const auto& packet : coded(options, 10, {}, noisy_waves)) payloads[threads / 4].push_back(packet.payload);
+    }
+    EXPECT_TRUE(payloads[0] == payloads[1]);
+}
+
+TEST(PicturesWithForesight, AreAv1ByTheQuantiserAlone) {
+    auto options = foreseeing(8);
+    options.bits_per_second = 1e6;
+    EXPECT_FALSE(PictureEncoder::create(options));
+    options = foreseeing(8);
+    options.coder = PictureCoder::vp9;
+    EXPECT_FALSE(PictureEncoder::create(options));
+    EXPECT_FALSE(PictureEncoder::create(foreseeing(36)));
+    auto encoder = PictureEncoder::create(foreseeing(8));
+    ASSERT_TRUE(encoder);
+    EXPECT_FALSE(encoder->encode(OwnPlanes(waves(0)).view()));
 }
 
 TEST(PictureEncoder, RefusesWhatItCannotCode) {
