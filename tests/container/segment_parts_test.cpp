@@ -4,6 +4,7 @@
 
 #include "container/container_streams.h"
 #include "container/fragment.h"
+#include "htvm/decoder.hpp"
 
 namespace htvm::test {
 namespace {
@@ -75,7 +76,8 @@ TEST(SegmentParts, have_pictures_of_another_size_as_whole_packets) {
         picture.coder = PictureCoder::av1;
         picture.width = 128;
         picture.height = 32;
-        picture.coded = read_texture_picture(picture_packet(8, packet.frame == 8 ? 8 : 7))->coded;
+        const auto same = picture_packet(8, packet.frame == 8 ? 8 : 7);
+        picture.coded = read_texture_picture(same)->coded;
         packet = write_texture_picture(picture, {packet.frame, 8, packet.timestamp_us, true});
     }
     const auto mp4 = joined(parts_of(stream, 0.16, 0.07));
