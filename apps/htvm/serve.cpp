@@ -340,7 +340,8 @@ CLI::Option* add_seconds(CLI::App& command, const std::string& name, double left
         double seconds = left_out;
         if (!given.empty() && !given[0].empty() && !CLI::detail::lexical_cast(given[0], seconds)) return false;
         if (seconds < range.first || seconds > range.second)
-            throw CLI::ValidationError(name, fmt::format("{} is not from {} to {}", seconds, range.first, range.second));
+            throw CLI::ValidationError(name,
+                                       fmt::format("{} is not from {} to {}", seconds, range.first, range.second));
         set(seconds);
         return true;
     };
@@ -349,8 +350,7 @@ CLI::Option* add_seconds(CLI::App& command, const std::string& name, double left
 
 void add_segments(CLI::App& command, Options& options) {
     auto* segments = add_seconds(
-        command, "--segments", 2, {1, 60},
-        [&options](double seconds) { options.segments.emplace().seconds = seconds; },
+        command, "--segments", 2, {1, 60}, [&options](double seconds) { options.segments.emplace().seconds = seconds; },
         "Offer each live stream to HTTP caches and their viewers, too: /hls/NAME/stream.m3u8 is a playlist (HLS) of "
         "segments of at least so many seconds (default 2), cut where players can start");
     command

@@ -111,9 +111,9 @@ private:
     std::uint64_t places_ = 0;                // packets pushed
     std::map<std::uint64_t, Stored> stored_;  // that later frames may need, by their places
     std::size_t stored_bytes_ = 0;
-    std::optional<EntryNumbers> usable_;      // nothing: all
-    std::optional<StreamSample> sample_;      // that is not complete
-    std::uint64_t begin_place_ = 0;           // of its first packet
+    std::optional<EntryNumbers> usable_;  // nothing: all
+    std::optional<StreamSample> sample_;  // that is not complete
+    std::uint64_t begin_place_ = 0;       // of its first packet
     std::uint32_t samples_ = 0;
     bool has_frame_ = false;
     std::vector<std::uint64_t> closure_;  // of its frame, where decoding can start

@@ -25,7 +25,8 @@ protected:
         segments.reset();
         hub.emplace(limits);
         segments.emplace(options, *hub);
-        publisher = *hub->publish("anna", [] {}, now);
+        publisher = *hub->publish(
+            "anna", [] {}, now);
     }
     void send(const Packet& packet) {
         const auto bytes = write_packet(packet);
@@ -120,7 +121,9 @@ TEST_F(LiveSegmentsTest, PartsOneAfterAnotherAreTheSegment) {
     const std::regex part("#EXT-X-PART:DURATION=([0-9.]+),URI=\"([^\"]+)\"(,INDEPENDENT=YES)?");
     std::string parts;
     std::vector<std::string> independent;
-    for (std::sregex_iterator at(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(text.find("#EXTINF")), part), end; at != end; ++at) {
+    for (std::sregex_iterator at(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(text.find("#EXTINF")), part),
+         end;
+         at != end; ++at) {
         EXPECT_LE(std::stod((*at)[1]), 0.34);
         parts += content((*at)[2]);
         independent.push_back((*at)[3]);
@@ -200,11 +203,12 @@ TEST_F(LiveSegmentsTest, ManySequenceHeadersTakeNoMemoryForEver) {
 }
 
 TEST_F(LiveSegmentsTest, AStreamThatGivesWayLosesItsSegments) {
-    begin({.seconds = 1}, {.memory = 2500000, .stream_memory = 3000000});
+    begin({.seconds = 1}, {.memory = 1800000, .stream_memory = 3000000});
     send(live_header(1));
     send_frames(0, 92, 10000);
     const auto number = list().first_number;
-    auto other = *hub->publish("berta", [] {}, now);
+    auto other = *hub->publish(
+        "berta", [] {}, now);
     ASSERT_TRUE(hub->receive_packet(other, write_packet(live_header(2)), now));
     for (std::uint32_t frame = 0; frame < 200; ++frame)
         static_cast<void>(hub->receive_packet(other, write_packet(live_intra(frame, 10000)), now));
@@ -222,8 +226,9 @@ protected:
     SegmentsServerTest() {
         options.hub = &hub;
         options.segments = &segments;
-        publisher = *hub.publish("anna", [] {}, Hub::Clock::now());
-        for (const auto& packet : {live_header(1), live_intra(0), live_intra(30), live_intra(60)})
+        publisher = *hub.publish(
+            "anna", [] {}, Hub::Clock::now());
+        for (const auto& packet : {live_header(1), live_intra(0), live_intra(30), live_intra(60), live_intra(90)})
             static_cast<void>(hub.receive_packet(publisher, write_packet(packet), Hub::Clock::now()));
     }
     void TearDown() override { ServerTest::TearDown(); }

@@ -148,11 +148,11 @@ namespace {
 // Known to the hub's thread alone.
 struct Work {
     HubMemory::SharedShare share;
-    SharedPacket header{};                        // of the session
-    std::vector<SharedPacket> before{};           // codebooks since the last frame, while there is no segmenter
-    std::optional<StreamSegmenter> segmenter{};   // none: it begins with a frame that can be decoded by itself
-    std::size_t held = 0;                         // bytes of it that the share counts
-    bool discontinuity = false;                   // the next segment's times begin anew
+    SharedPacket header{};                       // of the session
+    std::vector<SharedPacket> before{};          // codebooks since the last frame, while there is no segmenter
+    std::optional<StreamSegmenter> segmenter{};  // none: it begins with a frame that can be decoded by itself
+    std::size_t held = 0;                        // bytes of it that the share counts
+    bool discontinuity = false;                  // the next segment's times begin anew
     Clock::time_point segment_begun{}, asked{};
 };
 
@@ -242,8 +242,7 @@ void LiveSegments::State::take(const std::string& name, const SharedPacket& pack
     }
 }
 
-void LiveSegments::State::push(const std::string& name, Work& work, const SharedPacket& packet,
-                               Clock::time_point now) {
+void LiveSegments::State::push(const std::string& name, Work& work, const SharedPacket& packet, Clock::time_point now) {
     if (!work.segmenter) return;
     const auto room = [&] { return hub.make_room(*work.share, 2 * packet->bytes.size(), now); };
     if (!room()) return lose(name, work);

@@ -22,9 +22,9 @@
 namespace htvm::live {
 
 struct LiveSegmentOptions {
-    double seconds = 2;                                 // that a segment lasts at least: it ends where players can start
-    double part_seconds = 0;                            // that no part of it is longer than; 0: whole segments alone
-    double window_seconds = 60;                         // of each stream, that the playlist has
+    double seconds = 2;          // that a segment lasts at least: it ends where players can start
+    double part_seconds = 0;     // that no part of it is longer than; 0: whole segments alone
+    double window_seconds = 60;  // of each stream, that the playlist has
     std::size_t stream_bytes = std::size_t{128} << 20;  // of each stream; where these are fewer seconds, so many
     std::size_t waiting = 4096;                         // requests at once for what is not there yet
     std::chrono::milliseconds remembered{60000};        // a stream that has ended
@@ -65,7 +65,7 @@ public:
         State state = State::nothing;
         std::shared_ptr<const std::string> bytes{};  // which `content` is of
         std::string_view content{};
-        std::string tag{};       // of a playlist: the entity tag
+        std::string tag{};  // of a playlist: the entity tag
         Waits waiting{};
         double patience = 0;  // seconds for which to wait at most
     };

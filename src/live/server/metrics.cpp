@@ -210,8 +210,7 @@ void add_segments(Metrics& metrics, const MetricsSources& sources) {
     metrics.counter("segments_parts_total", "Parts of segments that were made", made.parts);
     metrics.counter("segments_bytes_total", "Bytes of segments and maps that were made", made.bytes);
     metrics.gauge("segments_held_bytes", "Of segments and maps, in memory", made.held_bytes);
-    metrics.counter("segments_lost_total",
-                    "Segments given up: no memory, or nowhere to start for too long", made.lost);
+    metrics.counter("segments_lost_total", "Segments given up: no memory, or nowhere to start for too long", made.lost);
     metrics.gauge("segments_waiting", "Requests that wait for what is not there yet", made.waiting);
     metrics.counter("segments_refused_waiting_total", "Requests refused since too many waited", made.refused_waiting);
     if (!sources.traffic) return;

@@ -59,8 +59,8 @@ net::awaitable<LiveSegments::Found> find(LiveSegments& segments, const Asked& as
                                            : segments.file(asked.stream, asked.file, wake);
     };
     auto found = look();
-    const auto end = std::chrono::steady_clock::now() +
-                     std::chrono::milliseconds(static_cast<std::int64_t>(1000 * found.patience));
+    const auto end =
+        std::chrono::steady_clock::now() + std::chrono::milliseconds(static_cast<std::int64_t>(1000 * found.patience));
     while (found.state == LiveSegments::Found::State::waits && std::chrono::steady_clock::now() < end) {
         timer->expires_at(end);
         co_await timer->async_wait(awaited);
@@ -130,16 +130,15 @@ net::awaitable<Response> answer_asked(const Site& site, const Asked& asked, cons
     const auto wanted = list ? wanted_by(request) : Wanted{};
     if (!wanted.good) co_return empty_response(http::status::bad_request, std::move(header));
     auto found = co_await find(*site.segments, asked, wanted.position);
-    if (found.state != LiveSegments::Found::State::there)
-        co_return refused_response(found.state, std::move(header));
+    if (found.state != LiveSegments::Found::State::there) co_return refused_response(found.state, std::move(header));
     co_return list ? playlist_response(found, wanted.position.has_value(), request, std::move(header))
                    : file_response(found, asked.file, request, std::move(header));
 }
 
 }  // namespace
 
-net::awaitable<Response> answer_segments(const Site& site, const std::vector<std::string>& path,
-                                         const Request& request, ResponseHeader header) {
+net::awaitable<Response> answer_segments(const Site& site, const std::vector<std::string>& path, const Request& request,
+                                         ResponseHeader header) {
     site.admission.let_others_read(request, header);
     if (header.count(http::field::access_control_allow_origin))
         header.set(http::field::access_control_expose_headers, "Content-Range, ETag, Date, Age");
