@@ -8,6 +8,7 @@ segment that it has anew, for so long (default: 6 s): first from the hub, then t
 killed and started again, and links are checked. Exits with 77 where there is no nginx.
 """
 import asyncio
+import concurrent.futures
 import os
 import re
 import shutil
@@ -202,7 +203,7 @@ def check_links(bench):
     subprocess.run([bench.htvm, "serve", "--link-keys", keys, "--add-link-key"], check=True, **QUIET)
     bench.stop("publisher")
     bench.stop("hub")
-    bench.start_hub("--link-keys", keys)
+    bench.start_hub("--link-keys", keys, "--parts", "0.3")
     bench.start_publisher()
 
     def link(name):
@@ -225,6 +226,24 @@ def check_links(bench):
     assert status(EDGE, other.replace("stream.m3u8", segment)) == 403
     assert counted()[0] - before <= 3, counted()[0] - before
     print("links are checked by the hub once, and what is behind them is kept once")
+    check_parts(good)
+
+
+def check_parts(playlist):
+    """Who has the playlist asks for the part that is next, and has it as soon as it is there."""
+    text = get(EDGE, playlist)[0].decode()
+    number = number_of(text.encode()) + len(re.findall("#EXTINF", text))
+    before = counted()[0]
+    with concurrent.futures.ThreadPoolExecutor(20) as pool:
+        asked = f"{playlist}?_HLS_msn={number + 1}&_HLS_part=0"
+        seen = {body for body, _ in pool.map(lambda _: get(EDGE, asked), range(20))}
+    assert len(seen) == 1 and f"/{number + 1}-" in "/" + "/".join(re.findall(r'PART:.*URI="([^"]+)', seen.pop().decode()))
+    assert counted()[0] - before == 1, "one of those who wait asks the hub"
+    hint = re.search(r'PRELOAD-HINT:TYPE=PART,URI="([^"]+)"', get(HUB, playlist)[0].decode()).group(1)
+    part = get(EDGE, playlist.replace("stream.m3u8", hint))
+    assert part[1]["Cache-Control"].endswith("immutable") and len(part[0]) > 0
+    assert status(EDGE, f"{playlist}?_HLS_msn={number + 100}") == 400
+    print("who waits for a part waits with all others behind one request")
 
 
 def main():
