@@ -51,12 +51,12 @@ std::vector<Packet> any_packets(fuzz::FuzzInput& input) {
     return out;
 }
 
-// The first map, and all parts one after another.
+// Maps, each before the parts of its segment: one after another, as a playlist has them.
 Bytes parts_of(const std::vector<Packet>& packets, double seconds, double part_seconds) {
     StreamSegmenter segmenter(seconds, part_seconds);
     Bytes out;
     const auto take = [&out](const StreamSegment& part) {
-        if (out.empty()) out = part.map;
+        out.insert(out.end(), part.map.begin(), part.map.end());
         out.insert(out.end(), part.media.begin(), part.media.end());
     };
     for (const auto& packet : packets) {
