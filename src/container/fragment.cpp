@@ -262,14 +262,16 @@ Result<std::optional<StreamSegment>> StreamSegmenter::push(Packet packet) {
 Result<std::vector<StreamSegment>> StreamSegmenter::finish() {
     std::vector<StreamSegment> out;
     auto sample = sampler_.finish();
-    std::array<std::optional<SampleRange>, 2> ranges;
-    if (sample) ranges[0] = cutter_.push(std::move(*sample));
-    ranges[1] = cutter_.finish(sampler_.total_us());
-    for (auto& range : ranges) {
+    const auto take = [&](std::optional<SampleRange> range) -> Result<void> {
         auto segment = segment_of(std::move(range));
         if (!segment) return tl::unexpected(segment.error());
         if (*segment) out.push_back(std::move(**segment));
-    }
+        return {};
+    };
+    // One after the other: the map of the first has what still waits in the cutter.
+    if (sample)
+        if (auto taken = take(cutter_.push(std::move(*sample))); !taken) return tl::unexpected(taken.error());
+    if (auto taken = take(cutter_.finish(sampler_.total_us())); !taken) return tl::unexpected(taken.error());
     return out;
 }
 
