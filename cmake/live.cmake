@@ -76,7 +76,7 @@ file(GLOB hub_sources CONFIGURE_DEPENDS src/live/hub/*.cpp)
 list(FILTER hub_sources EXCLUDE REGEX "/${other_nats_source}$")
 htvm_floor(live_hub SOURCES ${hub_sources} LINKS htvm_live_client ${nats_library})
 file(GLOB server_sources CONFIGURE_DEPENDS src/live/server/*.cpp)
-htvm_floor(live SOURCES ${server_sources} ${player_cpp} LINKS htvm_live_hub htvm_io)
+htvm_floor(live SOURCES ${server_sources} ${player_cpp} LINKS htvm_live_hub htvm_io htvm_container)
 if(HTVM_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # clang 14 cannot assemble its check of indirect calls in coroutines.
   # PUBLIC: the floors' tests have coroutines too.

@@ -107,6 +107,8 @@ endif()
 if(NOT HTVM_SANITIZE)
   add_test(NAME cdn COMMAND ${PROJECT_SOURCE_DIR}/tests/cdn/edge.py $<TARGET_FILE:htvm> 100)
   set_tests_properties(cdn PROPERTIES TIMEOUT 180 SKIP_RETURN_CODE 77 RUN_SERIAL ON)
+  add_test(NAME cdn_hub COMMAND ${PROJECT_SOURCE_DIR}/tests/cdn/hub_edge.py $<TARGET_FILE:htvm>)
+  set_tests_properties(cdn_hub PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 77 RUN_SERIAL ON)
 endif()
 # Compares formats, in Python: sanitizers would only make it slow.
 if(NOT HTVM_SANITIZE)

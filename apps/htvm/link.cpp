@@ -19,7 +19,7 @@ namespace {
 struct Options {
     std::string name, keys, hub = "http://127.0.0.1:8080";
     std::uint64_t seconds = 0;
-    bool file = false, packets = false;
+    bool file = false, packets = false, segments = false;
 };
 
 // A path as an address spells it: what is no letter, digit or one of -_.~/ becomes %XX.
@@ -52,9 +52,13 @@ Result<void> link(const Options& options) {
     if (!hub.starts_with("http://") && !hub.starts_with("https://"))
         return fail(ErrorKind::bad_input,
                     fmt::format("{} is no address of a hub: https://HOST or http://HOST:PORT", hub));
-    const auto path = (options.file ? "files/" : "watch/") + options.name;
+    const auto path = (options.file ? "files/" : options.segments ? "hls/" : "watch/") + options.name;
     const auto query =
         live::link_query(*keys, path, std::chrono::system_clock::now() + std::chrono::seconds(options.seconds));
+    if (options.segments) {
+        fmt::print("{}/hls/{}/{}/stream.m3u8\n", hub, live::link_segment(query), in_address(options.name));
+        return {};
+    }
     if (options.packets) hub.replace(0, 4, "ws");  // https becomes wss
     const auto shown = options.file || options.packets ? path : "play/" + options.name;
     fmt::print("{}/{}?{}\n", hub, in_address(shown), query);
@@ -85,6 +89,11 @@ void add_link(CLI::App& app, Run& run) {
     command
         ->add_flag("--packets", options->packets, "The address for programs, such as htvm decode, instead of the page")
         ->excludes(file);
+    command
+        ->add_flag("--segments", options->segments,
+                   "The address of the stream's playlist (htvm serve --segments), in whose path the link is")
+        ->excludes(file)
+        ->excludes("--packets");
     command->footer(
         "Nobody can change the name or the time in a link. Whoever has it can pass it on; one that has expired ends\n"
         "no viewer who is already watching.\n"

@@ -3,10 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <memory>
 #include <utility>
 
+#include "container/box.h"
 #include "core/letter_case.h"
 #include "io/mesh_file.h"
 #include "io/output_file.h"
@@ -128,6 +130,26 @@ struct Pieces {
     }
 };
 
+// Whether the file is boxes one after another up to its end: one that is cut short would take the next file's bytes for
+// its own.
+bool has_whole_boxes(const fs::path& path, std::uint64_t bytes) {
+    std::ifstream file(path, std::ios::binary);
+    for (std::uint64_t offset = 0; offset < bytes;) {
+        std::array<std::uint8_t, 16> beginning{};
+        const auto known = static_cast<std::size_t>(std::min<std::uint64_t>(beginning.size(), bytes - offset));
+        file.seekg(static_cast<std::streamoff>(offset));
+        if (!file.read(reinterpret_cast<char*>(beginning.data()), static_cast<std::streamsize>(known))) return false;
+        BoxReader in{std::span(beginning).first(known)};
+        std::uint64_t size = in.u32();
+        in.skip(4);
+        if (size == 1) size = in.u64();
+        if (size == 0) size = bytes - offset;
+        if (!in.ok() || size < 8 || size > bytes - offset) return false;
+        offset += size;
+    }
+    return bytes > 0;
+}
+
 Result<void> add_piece(Pieces& pieces, const fs::path& playlist, const std::string& name) {
     if (!is_name_below(name))
         return fail(ErrorKind::bad_input,
@@ -137,6 +159,9 @@ Result<void> add_piece(Pieces& pieces, const fs::path& playlist, const std::stri
     const auto bytes = fs::is_regular_file(path, error) ? fs::file_size(path, error) : 0;
     if (error || !fs::is_regular_file(path, error))
         return fail(ErrorKind::bad_input, fmt::format("{} names {}, which is not there", playlist.string(), name));
+    if (!has_whole_boxes(path, bytes))
+        return fail(ErrorKind::corrupt_stream,
+                    fmt::format("{} names {}, which is cut short, or no segment", playlist.string(), name));
     pieces.pieces.push_back({path, pieces.size(), pieces.size() + bytes});
     return {};
 }

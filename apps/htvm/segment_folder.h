@@ -50,7 +50,8 @@ private:
     std::size_t written_ = 0;
 };
 
-// All that a playlist names, as one .mp4 in fragments. bad_input if a file is not there, or not beside the playlist.
+// All that a playlist names, as one .mp4 in fragments. bad_input if a file is not there, or not beside the playlist;
+// corrupt_stream if one is cut short.
 Result<FileBytes> source_of_playlist(const std::string& path);
 
 }  // namespace htvm::app

@@ -11,14 +11,17 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "command_line/headings.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "live/server/credentials.h"
 #include "live/server/http_request.h"
+#include "live/server/live_segments.h"
 #include "live/server/player_files.h"
 #include "live/server/recorder.h"
 #include "live/server/server.h"
@@ -30,6 +33,8 @@ struct Options {
     live::ServerOptions server;
     live::HubLimits hub;
     live::RecorderOptions recorder;
+    std::optional<live::LiveSegmentOptions> segments{};
+    double window_seconds = 60, part_seconds = 0;
     std::optional<std::string> add_publisher{};  // only to make a token
     std::string congestion_control = "bbr";
     std::string access_log{};  // a file, or "-"
@@ -176,6 +181,13 @@ Result<void> serve(const Options& options) {
         if (!opened) return tl::unexpected(opened.error());
         server.recorder = &recorder.emplace(std::move(*opened));
     }
+    std::optional<live::LiveSegments> segments;
+    if (options.segments) {
+        auto settings = *options.segments;
+        settings.window_seconds = options.window_seconds;
+        settings.part_seconds = options.part_seconds;
+        server.segments = &segments.emplace(settings, hub);
+    }
     server.log = log;
     allow_files(server.admission.connections);
     auto opened = live::Server::open(server);
@@ -321,6 +333,38 @@ void add_proxies(CLI::App& command, Options& options) {
                      "Other hubs may listen on the same port: one that is started takes over before this one ends");
 }
 
+// An option whose number may be left out.
+CLI::Option* add_seconds(CLI::App& command, const std::string& name, double left_out, std::pair<double, double> range,
+                         const std::function<void(double)>& set, const std::string& text) {
+    const auto take = [=](const CLI::results_t& given) {
+        double seconds = left_out;
+        if (!given.empty() && !given[0].empty() && !CLI::detail::lexical_cast(given[0], seconds)) return false;
+        if (seconds < range.first || seconds > range.second)
+            throw CLI::ValidationError(name,
+                                       fmt::format("{} is not from {} to {}", seconds, range.first, range.second));
+        set(seconds);
+        return true;
+    };
+    return command.add_option(name, take, text)->type_name("SECONDS")->expected(0, 1);
+}
+
+void add_segments(CLI::App& command, Options& options) {
+    auto* segments = add_seconds(
+        command, "--segments", 2, {1, 60}, [&options](double seconds) { options.segments.emplace().seconds = seconds; },
+        "Offer each live stream to HTTP caches and their viewers, too: /hls/NAME/stream.m3u8 is a playlist (HLS) of "
+        "segments of at least so many seconds (default 2), cut where players can start");
+    command
+        .add_option("--window", options.window_seconds,
+                    "Seconds of each stream that its playlist has, so far can viewers go back (default 60)")
+        ->type_name("SECONDS")
+        ->check(CLI::Range(1.0, 86400.0))
+        ->needs(segments);
+    add_seconds(
+        command, "--parts", 0.5, {0.1, 2}, [&options](double seconds) { options.part_seconds = seconds; },
+        "Offer a segment in parts of at most so many seconds (default 0.5) while it comes, so viewers are less late")
+        ->needs(segments);
+}
+
 void add_recording(CLI::App& command, Options& options) {
     auto* folder = command
                        .add_option("--record", options.recorder.folder,
@@ -409,6 +453,8 @@ void add_serve(CLI::App& app, Run& run) {
     add_access_options(*command, *options);
     under("Behind other servers");
     add_proxies(*command, *options);
+    under("Caches before the hub");
+    add_segments(*command, *options);
     under("Recording and watching over it");
     add_recording(*command, *options);
     command->add_flag("--json", options->json,
@@ -427,6 +473,7 @@ void add_serve(CLI::App& app, Run& run) {
                      {"--link-keys", "Watching needs a link that htvm link signs with a key of this file"},
                      {"--add-link-key"},
                      {"--origin", "Pages of this site alone may read and watch (default: of all)"},
+                     {"--segments", "Offer live streams to HTTP caches: /hls/NAME/stream.m3u8"},
                      {"--record", "Keep each session of a live stream in this folder"},
                      {"--config", "Read options from a file, a line each: port = 8443"},
                      {"--json", "Log as JSON, an object a line"}}});

@@ -34,6 +34,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         fuzz::require(live::check_link(keys, text, '?' + query, now) == live::LinkCheck::forged,
                       "a link is good for its path alone");
 
+    const auto segment = live::link_segment(query);
+    fuzz::require(live::check_link(keys, "watch/anna", live::link_target(segment), now) == good,
+                  "a link in a path is the same link");
+    if (text.find(query.substr(query.size() - 64)) == std::string::npos) {
+        const auto other = live::check_link(keys, "watch/anna", live::link_target(text), now);
+        fuzz::require(other == live::LinkCheck::missing || other == live::LinkCheck::forged,
+                      "nobody can make one of a path without the key");
+    }
+
     const auto token = live::bearer_token(text);
     fuzz::require(text.ends_with(token), "a token is the end of its header");
     const live::Publishers publishers = {{"anna", live::TokenHash{{1}, {2}}}};

@@ -1,5 +1,6 @@
 // An .mp4 of any bytes is read without harm: what comes of it is no more than twice the file. One that was written from
-// packets, of any bytes, gives them back.
+// packets, of any bytes, gives them back, and so do segments in parts.
+#include "container/fragment.h"
 #include "container/mp4_file.h"
 #include "container/mp4_packets.h"
 #include "fuzz_input.h"
@@ -50,6 +51,25 @@ std::vector<Packet> any_packets(fuzz::FuzzInput& input) {
     return out;
 }
 
+// Maps, each before the parts of its segment: one after another, as a playlist has them.
+Bytes parts_of(const std::vector<Packet>& packets, double seconds, double part_seconds) {
+    StreamSegmenter segmenter(seconds, part_seconds);
+    Bytes out;
+    const auto take = [&out](const StreamSegment& part) {
+        out.insert(out.end(), part.map.begin(), part.map.end());
+        out.insert(out.end(), part.media.begin(), part.media.end());
+    };
+    for (const auto& packet : packets) {
+        const auto part = segmenter.push(packet);
+        require(part.has_value(), "small packets fit a segment");
+        if (*part) take(**part);
+    }
+    const auto rest = segmenter.finish();
+    require(rest.has_value(), "small packets fit a segment");
+    for (const auto& part : *rest) take(part);
+    return out;
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -83,5 +103,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto back = stream_in(mp4, damaged);
     require(back && damaged == 0, "what is written is read");
     require(*back == expected, "a stream comes back byte for byte");
+    const auto parts = stream_in(parts_of(packets, 0.1, 0.04), damaged);
+    require(parts && damaged == 0, "segments in parts are read");
+    require(*parts == expected, "a stream comes back of its parts");
     return 0;
 }

@@ -71,15 +71,27 @@ void write_run(BoxWriter& out, Run& run, const std::vector<const TrackSample*>& 
 
 // ---- Ranges ---------------------------------------------------------------------------------------------------------
 
+std::optional<SampleRange> RangeCutter::cut(std::int64_t end_us, bool next_begins) {
+    range_.end_us = end_us;
+    range_.ends = next_begins;
+    auto out = std::exchange(range_, {});
+    range_.begins = next_begins;
+    return out;
+}
+
 std::optional<SampleRange> RangeCutter::push(StreamSample sample) {
     std::optional<SampleRange> out;
-    const auto time = sample.mesh().time;
-    if (!range_.samples.empty() && sample.mesh().sync) {
-        const auto& first = range_.samples.front().mesh();
-        if (time - first.time >= least_us_ || sample.mesh().entry != first.entry) {
-            range_.end_us = time;
-            out = std::exchange(range_, {});
-        }
+    const auto& mesh = sample.mesh();
+    if (!range_.samples.empty()) {
+        const auto last = range_.samples.back().mesh().time, first = range_.samples.front().mesh().time;
+        if (mesh.sync && (mesh.time - begin_us_ >= least_us_ || mesh.entry != entry_))
+            out = cut(mesh.time, true);
+        else if (part_us_ > 0 && mesh.time + (mesh.time - last) - first > part_us_)
+            out = cut(mesh.time, false);
+    }
+    if (range_.samples.empty() && range_.begins) {
+        begin_us_ = mesh.time;
+        entry_ = mesh.entry;
     }
     range_.samples.push_back(std::move(sample));
     return out;
@@ -87,8 +99,7 @@ std::optional<SampleRange> RangeCutter::push(StreamSample sample) {
 
 std::optional<SampleRange> RangeCutter::finish(std::uint64_t total_us) {
     if (range_.samples.empty()) return std::nullopt;
-    range_.end_us = std::max(static_cast<std::int64_t>(total_us), range_.samples.back().mesh().time);
-    return std::exchange(range_, {});
+    return cut(std::max(static_cast<std::int64_t>(total_us), range_.samples.back().mesh().time), true);
 }
 
 // ---- Fragments ------------------------------------------------------------------------------------------------------
@@ -139,60 +150,104 @@ Result<std::vector<std::uint8_t>> write_fragment(const SampleRange& range, std::
 
 namespace {
 
-// The entries that the samples have, alone, and the samples renamed to them.
+void add_used(StreamSampler::EntryNumbers& used, const StreamSample& sample) {
+    for (std::size_t track = 0; track < sample_tracks; ++track)
+        for (const auto& one : sample.tracks[track])
+            if (std::find(used[track].begin(), used[track].end(), one.entry) == used[track].end())
+                used[track].push_back(one.entry);
+}
+
 template <class Entry>
-std::vector<Entry> entries_of(SampleRange& range, std::size_t track, const std::vector<Entry>& all) {
-    std::vector<std::uint16_t> used;
-    for (auto& sample : range.samples)
-        for (auto& one : sample.tracks[track]) {
-            const auto at = std::find(used.begin(), used.end(), one.entry);
-            const auto place = static_cast<std::uint16_t>(at - used.begin());
-            if (at == used.end()) used.push_back(one.entry);
-            one.entry = place;
-        }
+std::vector<Entry> chosen(const std::vector<Entry>& all, const std::vector<std::uint16_t>& numbers) {
     std::vector<Entry> out;
-    for (const auto number : used) out.push_back(all[number]);
+    for (const auto number : numbers) out.push_back(all[number]);
     return out;
 }
 
 }  // namespace
 
-Result<std::optional<StreamSegment>> StreamSegmenter::segment_of(std::optional<SampleRange> range) {
-    if (!range) return std::nullopt;
-    Movie movie;
+// Those that the samples have, alone. Tracks stay once they are there, so that maps differ no more than they must.
+void StreamSegmenter::choose_entries(const SampleRange& range) {
+    StreamSampler::EntryNumbers used;
+    for (const auto& sample : range.samples) add_used(used, sample);
+    if (in_parts_) {
+        // The map is there before the rest of the segment: it has what is under way already, and nothing else may come.
+        for (const auto& sample : cutter_.waiting().samples) add_used(used, sample);
+        if (sampler_.incomplete()) add_used(used, *sampler_.incomplete());
+    }
     const auto& entries = sampler_.entries();
-    const auto first_of = [&](std::size_t track) { return samples_of(*range, track); };
-    if (const auto heard = first_of(sound); !heard.empty() && !first_sound_time_) first_sound_time_ = heard[0]->time;
+    if (used[1].empty() && has_pictures_) used[1] = {static_cast<std::uint16_t>(entries.pictures.size() - 1)};
+    if (used[2].empty() && has_sound_) used[2] = {static_cast<std::uint16_t>(entries.sound.size() - 1)};
+    has_pictures_ = !used[1].empty();
+    has_sound_ = !used[2].empty();
+    map_entries_ = used;
+    if (in_parts_) sampler_.use_only(std::move(used));
+}
+
+std::vector<std::uint8_t> StreamSegmenter::map_of(const SampleRange& range) {
+    choose_entries(range);
+    const auto& entries = sampler_.entries();
+    Movie movie;
     movie.fragmented = true;
     movie.first_sound_time = std::min<std::int64_t>(first_sound_time_.value_or(0), 0);
-    movie.entries.meshes = entries_of(*range, 0, entries.meshes);
-    movie.entries.pictures = entries_of(*range, 1, entries.pictures);
-    movie.entries.sound = entries_of(*range, 2, entries.sound);
-    // Tracks stay once they are there, so that maps differ no more than they must.
-    if (movie.entries.pictures.empty() && has_pictures_) movie.entries.pictures = {entries.pictures.back()};
-    if (movie.entries.sound.empty() && has_sound_) movie.entries.sound = {entries.sound.back()};
-    has_pictures_ = !movie.entries.pictures.empty();
-    has_sound_ = !movie.entries.sound.empty();
+    movie.entries.meshes = chosen(entries.meshes, map_entries_[0]);
+    movie.entries.pictures = chosen(entries.pictures, map_entries_[1]);
+    movie.entries.sound = chosen(entries.sound, map_entries_[2]);
     // Only the first map tells what is not heard of the first packet.
     if (sequence_ > 0)
         for (auto& entry : movie.entries.sound) entry.skip = 0;
     if (sequence_ == 0) movie.index = index_;
-    movie.needed_packets = range->samples.front().needed_packets;
+    movie.needed_packets = range.samples.front().needed_packets;
+    return write_movie(movie);
+}
+
+Result<std::optional<StreamSegment>> StreamSegmenter::segment_of(std::optional<SampleRange> range) {
+    if (!range) return std::nullopt;
+    if (const auto heard = samples_of(*range, sound); !heard.empty() && !first_sound_time_)
+        first_sound_time_ = heard[0]->time;
     StreamSegment out;
+    out.begins = range->begins;
+    out.ends = range->ends;
     out.begin_us = range->samples.front().mesh().time;
     out.end_us = range->end_us;
-    out.map = write_movie(movie);
+    if (out.begins) out.map = map_of(*range);
+    for (auto& sample : range->samples)
+        for (std::size_t track = 0; track < sample_tracks; ++track)
+            for (auto& one : sample.tracks[track]) {
+                const auto& known = map_entries_[track];
+                const auto at = std::find(known.begin(), known.end(), one.entry);
+                // A sequence header that comes in the middle of a segment is in the sample itself.
+                one.entry = static_cast<std::uint16_t>(at == known.end() ? 0 : at - known.begin());
+            }
     BoxWriter media;
-    media.begin(four("styp"));
-    media.text("msdh");
-    media.u32(0);
-    media.text("msdhhtvm");
-    media.end();
-    const auto fragment = write_fragment(*range, ++sequence_, movie.sound_shift(), false);
+    if (out.begins) {
+        media.begin(four("styp"));
+        media.text("msdh");
+        media.u32(0);
+        media.text("msdhhtvm");
+        media.end();
+    }
+    const auto shift = std::max<std::int64_t>(-first_sound_time_.value_or(0), 0);
+    const auto fragment = write_fragment(*range, ++sequence_, shift, false);
     if (!fragment) return tl::unexpected(fragment.error());
     media.bytes(*fragment);
     out.media = media.take();
     return out;
+}
+
+std::size_t StreamSegmenter::held_bytes() const {
+    std::size_t out = index_.size() + sampler_.held_bytes();
+    for (const auto& sample : cutter_.waiting().samples) {
+        out += sample.needed_packets.size();
+        for (const auto& track : sample.tracks)
+            for (const auto& one : track) out += one.bytes.size();
+    }
+    return out;
+}
+
+std::size_t StreamSegmenter::entries() const {
+    const auto& entries = sampler_.entries();
+    return entries.meshes.size() + entries.pictures.size() + entries.sound.size();
 }
 
 Result<std::optional<StreamSegment>> StreamSegmenter::push(Packet packet) {
@@ -207,14 +262,16 @@ Result<std::optional<StreamSegment>> StreamSegmenter::push(Packet packet) {
 Result<std::vector<StreamSegment>> StreamSegmenter::finish() {
     std::vector<StreamSegment> out;
     auto sample = sampler_.finish();
-    std::array<std::optional<SampleRange>, 2> ranges;
-    if (sample) ranges[0] = cutter_.push(std::move(*sample));
-    ranges[1] = cutter_.finish(sampler_.total_us());
-    for (auto& range : ranges) {
+    const auto take = [&](std::optional<SampleRange> range) -> Result<void> {
         auto segment = segment_of(std::move(range));
         if (!segment) return tl::unexpected(segment.error());
         if (*segment) out.push_back(std::move(**segment));
-    }
+        return {};
+    };
+    // One after the other: the map of the first has what still waits in the cutter.
+    if (sample)
+        if (auto taken = take(cutter_.push(std::move(*sample))); !taken) return tl::unexpected(taken.error());
+    if (auto taken = take(cutter_.finish(sampler_.total_us())); !taken) return tl::unexpected(taken.error());
     return out;
 }
 

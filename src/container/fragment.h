@@ -12,23 +12,33 @@
 
 namespace htvm {
 
-// Consecutive frames, the first of which is one where decoding can start.
+// Consecutive frames, the first of which is one where decoding can start, or a part of such a range.
 struct SampleRange {
     std::vector<StreamSample> samples;
     std::int64_t end_us = 0;  // when the last one's time ends
+    bool begins = true;       // false: goes on with the range before, as its next part
+    bool ends = true;         // false: the next one goes on with it
 };
 
 // Cuts a stream where decoding can start.
 class RangeCutter {
 public:
-    // A range ends at the first such place that is at least so long behind its beginning.
-    explicit RangeCutter(double seconds) : least_us_(static_cast<std::int64_t>(seconds * 1e6)) {}
+    // A range ends at the first such place that is at least so long behind its beginning. part_seconds: it comes in
+    // parts that last no longer, unless a single frame does; 0: whole.
+    explicit RangeCutter(double seconds, double part_seconds = 0)
+        : least_us_(static_cast<std::int64_t>(seconds * 1e6)),
+          part_us_(static_cast<std::int64_t>(part_seconds * 1e6)) {}
     // Gives out the range before, when the next one begins.
     std::optional<SampleRange> push(StreamSample sample);
     std::optional<SampleRange> finish(std::uint64_t total_us);
+    // What is not given out yet.
+    const SampleRange& waiting() const { return range_; }
 
 private:
-    std::int64_t least_us_;
+    std::optional<SampleRange> cut(std::int64_t end_us, bool next_begins);
+    std::int64_t least_us_, part_us_;
+    std::int64_t begin_us_ = 0;  // of the whole range
+    std::uint16_t entry_ = 0;    // likewise
     SampleRange range_;
 };
 
@@ -37,23 +47,36 @@ private:
 Result<std::vector<std::uint8_t>> write_fragment(const SampleRange& range, std::uint32_t sequence,
                                                  std::int64_t sound_shift, bool with_groups);
 
-// A piece of a stream for HTTP.
+// A piece of a stream for HTTP, or a part of one.
 struct StreamSegment {
+    bool begins = true;                     // false: a part that goes on with the one before
+    bool ends = true;                       // false: a part with which the next one goes on
     std::int64_t begin_us = 0, end_us = 0;  // from the stream's first frame
-    std::vector<std::uint8_t> map;          // ftyp and moov, with all that the first frame needs; many have the same
-    std::vector<std::uint8_t> media;        // styp, moof, mdat
+    std::vector<std::uint8_t> map;          // ftyp and moov, with all that the first frame needs; many have the same;
+                                            // empty where it does not begin
+    std::vector<std::uint8_t> media;        // styp, moof, mdat; moof, mdat where it does not begin
 };
 
 class StreamSegmenter {
 public:
-    explicit StreamSegmenter(double seconds) : cutter_(seconds) {}
+    // part_seconds: segments come in parts that last no longer, of which one after another is the segment; 0: whole.
+    // What a part's tables cannot say, as its map was written before, such as a picture of another size, is in whole
+    // packets until the next segment.
+    explicit StreamSegmenter(double seconds, double part_seconds = 0)
+        : cutter_(seconds, part_seconds), in_parts_(part_seconds > 0) {}
     // Takes every packet, in order. An index in front goes into the first map.
     Result<std::optional<StreamSegment>> push(Packet packet);
     // The rest: one segment, or two.
     Result<std::vector<StreamSegment>> finish();
+    // Bytes of what it holds of the stream: what is not given out yet, and what later frames may need.
+    std::size_t held_bytes() const;
+    // How many kinds of tables it remembers, which only grow.
+    std::size_t entries() const;
 
 private:
     Result<std::optional<StreamSegment>> segment_of(std::optional<SampleRange> range);
+    std::vector<std::uint8_t> map_of(const SampleRange& range);
+    void choose_entries(const SampleRange& range);
     StreamSampler sampler_;
     RangeCutter cutter_;
     std::vector<std::uint8_t> index_;
@@ -61,6 +84,8 @@ private:
     std::uint32_t sequence_ = 0;
     std::optional<std::int64_t> first_sound_time_;
     bool has_pictures_ = false, has_sound_ = false;  // any came so far
+    StreamSampler::EntryNumbers map_entries_;        // of the sampler's entries those that the map has, in its order
+    bool in_parts_ = false;
 };
 
 }  // namespace htvm

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <optional>
 
 namespace htvm {
@@ -99,25 +100,68 @@ Result<void> take_tag(Reading& reading, std::string_view line) {
 
 }  // namespace
 
+namespace {
+
+// To the millionth, with a point wherever this machine is.
+std::string decimal(double seconds) {
+    std::array<char, 64> out{};
+    const auto millionths = static_cast<long long>(std::llround(seconds * 1e6));
+    std::snprintf(out.data(), out.size(), "%lld.%06lld", millionths / 1000000, millionths % 1000000);
+    return out.data();
+}
+
+std::string date(std::int64_t unix_ms) {
+    const auto seconds = static_cast<std::time_t>(unix_ms / 1000);
+    std::tm parts{};
+    if (!gmtime_r(&seconds, &parts)) return "";
+    std::array<char, 64> out{};
+    std::strftime(out.data(), out.size(), "%Y-%m-%dT%H:%M:%S", &parts);
+    std::array<char, 16> thousandths{};
+    std::snprintf(thousandths.data(), thousandths.size(), ".%03dZ", static_cast<int>(unix_ms % 1000));
+    return std::string(out.data()) + thousandths.data();
+}
+
+// Of a playlist of parts: players ask for what is not there yet, and stay so far behind the end.
+std::string live_control(const Playlist& playlist) {
+    constexpr double parts_behind = 3;
+    return "#EXT-X-SERVER-CONTROL:CAN-BLOCK-RELOAD=YES,PART-HOLD-BACK=" +
+           decimal(parts_behind * playlist.part_seconds) +
+           "\n#EXT-X-PART-INF:PART-TARGET=" + decimal(playlist.part_seconds) + "\n";
+}
+
+// What comes before a segment's own name, or before that of its next part.
+std::string before_segment(const PlaylistSegment& segment, std::string& map) {
+    std::string out;
+    if (segment.discontinuity) out += "#EXT-X-DISCONTINUITY\n";
+    if (segment.map_uri != map) out += "#EXT-X-MAP:URI=\"" + segment.map_uri + "\"\n";
+    map = segment.map_uri;
+    if (segment.unix_ms > 0) out += "#EXT-X-PROGRAM-DATE-TIME:" + date(segment.unix_ms) + "\n";
+    for (const auto& part : segment.parts)
+        out += "#EXT-X-PART:DURATION=" + decimal(part.seconds) + ",URI=\"" + part.uri + '"' +
+               (part.independent ? ",INDEPENDENT=YES" : "") + "\n";
+    return out;
+}
+
+}  // namespace
+
 std::string write_playlist(const Playlist& playlist) {
     double longest_segment = std::max(playlist.target_seconds, 1.0);
     for (const auto& segment : playlist.segments) longest_segment = std::max(longest_segment, segment.seconds);
-    std::string out = "#EXTM3U\n#EXT-X-VERSION:7\n";
+    const bool in_parts = playlist.part_seconds > 0;
+    std::string out = std::string("#EXTM3U\n#EXT-X-VERSION:") + (in_parts ? "9" : "7") + "\n";
     out += "#EXT-X-TARGETDURATION:" + std::to_string(static_cast<long>(std::ceil(longest_segment - 0.0005))) + "\n";
+    if (in_parts) out += live_control(playlist);
     out += "#EXT-X-MEDIA-SEQUENCE:" + std::to_string(playlist.first_number) + "\n";
+    if (playlist.first_discontinuity > 0)
+        out += "#EXT-X-DISCONTINUITY-SEQUENCE:" + std::to_string(playlist.first_discontinuity) + "\n";
     if (playlist.kind == PlaylistKind::whole) out += "#EXT-X-PLAYLIST-TYPE:VOD\n";
     if (playlist.kind == PlaylistKind::event) out += "#EXT-X-PLAYLIST-TYPE:EVENT\n";
     out += "#EXT-X-INDEPENDENT-SEGMENTS\n";
     std::string map;
-    for (const auto& segment : playlist.segments) {
-        if (segment.map_uri != map) out += "#EXT-X-MAP:URI=\"" + segment.map_uri + "\"\n";
-        map = segment.map_uri;
-        std::array<char, 64> seconds{};
-        std::snprintf(seconds.data(), seconds.size(), "%lld.%06lld",
-                      static_cast<long long>(std::llround(segment.seconds * 1e6)) / 1000000,
-                      static_cast<long long>(std::llround(segment.seconds * 1e6)) % 1000000);
-        out += "#EXTINF:" + std::string(seconds.data()) + ",\n" + segment.uri + "\n";
-    }
+    for (const auto& segment : playlist.segments)
+        out += before_segment(segment, map) + "#EXTINF:" + decimal(segment.seconds) + ",\n" + segment.uri + "\n";
+    if (!playlist.next.parts.empty()) out += before_segment(playlist.next, map);
+    if (!playlist.hint.empty()) out += "#EXT-X-PRELOAD-HINT:TYPE=PART,URI=\"" + playlist.hint + "\"\n";
     if (playlist.has_end) out += "#EXT-X-ENDLIST\n";
     return out;
 }

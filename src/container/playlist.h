@@ -11,10 +11,21 @@
 
 namespace htvm {
 
+// A part of a segment, which can be fetched before the segment is whole.
+struct PlaylistPart {
+    std::string uri;
+    double seconds = 0;
+    bool independent = false;  // decoding can start with it
+};
+
 struct PlaylistSegment {
     std::string uri;      // relative to the playlist
     std::string map_uri;  // of what is needed before its first frame
     double seconds = 0;
+    bool discontinuity = false;         // its times begin anew: another session
+    std::vector<PlaylistPart> parts{};  // of a segment that is new enough
+    // When its first frame came, milliseconds since 1970; 0: not told.
+    std::int64_t unix_ms = 0;
 };
 
 enum class PlaylistKind : std::uint8_t {
@@ -29,6 +40,12 @@ struct Playlist {
     double target_seconds = 1;       // that no segment is longer than, when rounded
     std::vector<PlaylistSegment> segments;
     bool has_end = true;  // no segment follows
+
+    // Written, and passed over when read:
+    std::uint64_t first_discontinuity = 0;  // how many there were before the first segment that is listed
+    double part_seconds = 0;                // that no part is longer than; 0: there are none
+    PlaylistSegment next{};                 // the segment that is not whole: its map and the parts that are there
+    std::string hint{};                     // the part that comes next
 };
 
 std::string write_playlist(const Playlist& playlist);

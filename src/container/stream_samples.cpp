@@ -82,9 +82,25 @@ std::optional<StreamSample> StreamSampler::push(Packet packet) {
     const bool elsewhere = (packet.kind == PacketKind::texture && add_picture(packet, whole)) ||
                            (packet.kind == PacketKind::audio && add_sound(packet, whole));
     if (!elsewhere) append(sample_->tracks[0][0].bytes, whole);
-    if (comes_before_frames(packet.kind) || packet.kind == PacketKind::texture)
+    if (comes_before_frames(packet.kind) || packet.kind == PacketKind::texture) {
+        stored_bytes_ += whole.size();
         stored_[place] = {sample_->number, std::move(whole)};
+    }
     return out;
+}
+
+std::size_t StreamSampler::held_bytes() const {
+    std::size_t out = stored_bytes_;
+    if (sample_)
+        for (const auto& track : sample_->tracks)
+            for (const auto& one : track) out += one.bytes.size();
+    return out;
+}
+
+bool StreamSampler::is_usable(SampleTrack track, std::uint16_t entry) const {
+    if (!usable_) return true;
+    const auto& usable = (*usable_)[static_cast<std::size_t>(track)];
+    return std::find(usable.begin(), usable.end(), entry) != usable.end();
 }
 
 void StreamSampler::add_frame(const Packet& packet) {
@@ -109,8 +125,10 @@ bool StreamSampler::add_picture(const Packet& packet, std::span<const std::uint8
         if (configuration)
             picture_entry_ = place_of(entries_.pictures, {picture->coder, picture->width, picture->height,
                                                           picture->matrix, picture->full_range, *configuration});
+        // The pictures that go on from it then stay whole, too.
+        if (picture_entry_ && !is_usable(SampleTrack::pictures, *picture_entry_)) picture_entry_.reset();
     }
-    if (!picture_entry_) return false;
+    if (!picture_entry_ || !is_usable(SampleTrack::pictures, *picture_entry_)) return false;
     const auto& entry = entries_.pictures[*picture_entry_];
     const auto delimiter = delimiter_bytes(*picture);
     if (entry.coder != picture->coder || delimiter >= picture->coded.size()) return false;
@@ -134,7 +152,7 @@ bool StreamSampler::add_sound(const Packet& packet, std::span<const std::uint8_t
     // Sizes may be written longer than they need be, and bytes may lie behind the last.
     if (write_audio(*audio, packet.frame, packet.timestamp_us).payload != packet.payload) return false;
     const auto entry = place_of(entries_.sound, {audio->channels, audio->gain, audio->skip_begin});
-    if (!entry) return false;
+    if (!entry || !is_usable(SampleTrack::sound, *entry)) return false;
     constexpr std::int64_t farthest_us = std::int64_t{1} << 40;
     const auto behind = static_cast<double>(packet.timestamp_us) - static_cast<double>(frame_timestamp_us_);
     if (behind < -static_cast<double>(farthest_us) || behind > static_cast<double>(farthest_us)) return false;
@@ -163,8 +181,11 @@ bool StreamSampler::add_sound(const Packet& packet, std::span<const std::uint8_t
 
 void StreamSampler::find_needs(StreamSample& sample) {
     const auto kept = numbers_.dependencies().kept();
-    std::erase_if(stored_,
-                  [&](const auto& one) { return std::find(kept.begin(), kept.end(), one.first) == kept.end(); });
+    std::erase_if(stored_, [&](const auto& one) {
+        const bool unneeded = std::find(kept.begin(), kept.end(), one.first) == kept.end();
+        if (unneeded) stored_bytes_ -= one.second.bytes.size();
+        return unneeded;
+    });
     auto& mesh = sample.tracks[0][0];
     mesh.sync = !closure_.empty();
     if (closure_.empty()) return;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "htvm/audio.hpp"
@@ -82,6 +83,14 @@ public:
     // The last one.
     std::optional<StreamSample> finish();
     const TrackEntries& entries() const { return entries_; }
+    // The frame that is not complete, or nothing.
+    const std::optional<StreamSample>& incomplete() const { return sample_; }
+    // From here on pictures and sound become samples of their tracks if these entries fit them, and stay whole packets
+    // in the track of meshes otherwise: the tables of what follows are written already. By track; of meshes all do.
+    using EntryNumbers = std::array<std::vector<std::uint16_t>, sample_tracks>;
+    void use_only(EntryNumbers entries) { usable_ = std::move(entries); }
+    // Bytes of what it holds: the frame that is not complete, and what later ones may need.
+    std::size_t held_bytes() const;
     std::uint64_t total_us() const { return std::min(time_.total_us(), longest_us); }
 
 private:
@@ -94,14 +103,17 @@ private:
     bool add_picture(const Packet& packet, std::span<const std::uint8_t> whole);
     bool add_sound(const Packet& packet, std::span<const std::uint8_t> whole);
     void find_needs(StreamSample& sample);
+    bool is_usable(SampleTrack track, std::uint16_t entry) const;
 
     TrackEntries entries_;
     FrameNumbers numbers_;
     RunningTime time_;
     std::uint64_t places_ = 0;                // packets pushed
     std::map<std::uint64_t, Stored> stored_;  // that later frames may need, by their places
-    std::optional<StreamSample> sample_;      // that is not complete
-    std::uint64_t begin_place_ = 0;           // of its first packet
+    std::size_t stored_bytes_ = 0;
+    std::optional<EntryNumbers> usable_;  // nothing: all
+    std::optional<StreamSample> sample_;  // that is not complete
+    std::uint64_t begin_place_ = 0;       // of its first packet
     std::uint32_t samples_ = 0;
     bool has_frame_ = false;
     std::vector<std::uint64_t> closure_;  // of its frame, where decoding can start

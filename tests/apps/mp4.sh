@@ -55,6 +55,9 @@ grep -q '^#EXT-X-MEDIA-SEQUENCE:[1-9]' event/person.m3u8 || fail "the window's f
 mkdir encoded
 encode vp9 -o encoded/person.m3u8 && "$htvm" pack encoded/person.m3u8 -o back.htvm 2>/dev/null
 cmp person.htvm back.htvm || fail "encode -o .m3u8 makes another stream"
+cp "www/$segment" whole.m4s
+head -c 3000 whole.m4s >"www/$segment"
+expect 3 "names $segment, which is cut short" "$htvm" info www/person.m3u8
 rm "www/$segment"
 expect 1 "names $segment, which is not there" "$htvm" info www/person.m3u8
 printf '#EXTM3U\n#EXT-X-MAP:URI="../../etc/passwd"\n#EXTINF:1,\na.m4s\n' >outside.m3u8

@@ -67,7 +67,7 @@ FLOORS = [
     ("src/c_api/c_live.cpp",
      ["core", "c_api", "htvm/publisher.hpp", "htvm/watcher.hpp", "htvm/htvm.h", "htvm/htvm_live.h"]),
     ("src/live/hub", [*LIVE, "live/client"]),
-    ("src/live/server", [*LIVE, "io", "live/client", "live/hub"]),
+    ("src/live/server", [*LIVE, "io", "container", "live/client", "live/hub"]),
 ]
 # The programs stand above everything.
 LIBRARIES = [folder.removeprefix("src/") for folder, _ in FLOORS if folder.startswith("src/")]

@@ -33,6 +33,14 @@ Places united(const Places& a, const Places& b) {
 
 }  // namespace
 
+Packet packet_of(const LivePacket& packet) {
+    Packet out;
+    static_cast<PacketHeader&>(out) = packet.header;
+    out.payload.assign(packet.bytes.begin() + packet_header_bytes,
+                       packet.bytes.end() - (packet_overhead - packet_header_bytes));
+    return out;
+}
+
 bool LivePacket::is_frame() const { return frame_type(header.kind).has_value(); }
 
 bool LivePacket::is_reference() const {

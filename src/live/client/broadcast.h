@@ -36,6 +36,8 @@ struct LivePacket {
     bool is_access() const;
 };
 using SharedPacket = std::shared_ptr<const LivePacket>;
+// Of a packet that is whole.
+Packet packet_of(const LivePacket& packet);
 
 struct BroadcastLimits {
     // How much may wait for one viewer, besides what the kernel has taken:

@@ -287,7 +287,6 @@ std::shared_ptr<LivePacket> Hub::counted(LivePacket packet, const HubMemory::Sha
             }};
 }
 
-// Whether the share may take so much more, if need be once those that hold more have given way.
 bool Hub::make_room(const HubMemory::Share& share, std::size_t bytes, Clock::time_point now) {
     auto room = memory_.room_for(share, bytes, now);
     for (; room == HubMemory::Room::after_another_gave_way; room = memory_.room_for(share, bytes, now))
@@ -324,6 +323,8 @@ void Hub::give_way(HubMemory::Share& share, Clock::time_point now) {
     if (const auto found = streams_.find(name); found != streams_.end()) empty(found->second);
     for (auto& [number, stream] : ended_)
         if (stream.share.get() == &share) empty(stream);
+    for (const auto& listener : listeners_)
+        if (listener.gave_way) listener.gave_way(name);
 }
 
 // False if there is no memory for so much.

@@ -152,6 +152,8 @@ struct HubListener {
     std::function<void(const std::string& stream)> ended{};
     // Every packet that is new, whether it can be decoded or not. place: see Broadcast::push().
     std::function<void(const std::string& stream, std::uint64_t place, const SharedPacket& packet)> received{};
+    // The stream gave memory back that others needed, and whoever holds what counts as its own does likewise.
+    std::function<void(const std::string& stream)> gave_way{};
     // The publisher came, went, or began another session; the first viewer came, or the last one left; or it ended.
     std::function<void(const std::string& stream)> changed{};
 };
@@ -245,6 +247,11 @@ public:
     void close_publishers(CloseCode code, const std::string& reason);
     void close_all(CloseCode code, const std::string& reason);
 
+    // For what is made of a stream's packets and held, such as segments: it counts as the packets do.
+    HubMemory::SharedShare share_of(const std::string& stream) { return memory_.share_of(stream); }
+    // Whether the share may take so much more, if need be once those that hold more have given way.
+    bool make_room(const HubMemory::Share& share, std::size_t bytes, Clock::time_point now);
+
     std::vector<StreamInfo> streams(Clock::time_point now) const;
     std::optional<StreamInfo> stream(const std::string& name, Clock::time_point now) const;
     HubCounters counters() const;
@@ -310,7 +317,6 @@ private:
         std::optional<Closing> closing{};
     };
     static std::shared_ptr<LivePacket> counted(LivePacket packet, const HubMemory::SharedShare& share);
-    bool make_room(const HubMemory::Share& share, std::size_t bytes, Clock::time_point now);
     void give_way(HubMemory::Share& share, Clock::time_point now);
     bool hold(PartOfMessage& part, HubMemory::Share& share, std::size_t bytes, Clock::time_point now);
     static void drop(PartOfMessage& part, HubMemory::Share& share);

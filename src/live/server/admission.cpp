@@ -170,8 +170,12 @@ tl::expected<AddressCounts::Place, Refusal> Admission::admit_viewer(const Reques
 }
 
 std::optional<Refusal> Admission::refuse_path(const std::string& path, const Request& request) const {
+    return refuse_link(path, request.target());
+}
+
+std::optional<Refusal> Admission::refuse_link(const std::string& path, std::string_view target) const {
     if (!credentials_.link_keys) return std::nullopt;
-    const auto check = check_link(*credentials_.link_keys, path, request.target(), std::chrono::system_clock::now());
+    const auto check = check_link(*credentials_.link_keys, path, target, std::chrono::system_clock::now());
     if (check == LinkCheck::good) return std::nullopt;
     const char* cause = check == LinkCheck::missing   ? "link_missing"
                         : check == LinkCheck::expired ? "link_expired"

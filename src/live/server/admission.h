@@ -107,6 +107,8 @@ public:
                                                              bool socket, const Client& client);
     // Why the request may not read what is at this path, such as "files/anna.htvm", if so: there is need of a link.
     std::optional<Refusal> refuse_path(const std::string& path, const Request& request) const;
+    // Likewise, where the link's query is in this target.
+    std::optional<Refusal> refuse_link(const std::string& path, std::string_view target) const;
     // Why nobody may read what streams there are, if so.
     std::optional<Refusal> refuse_lists() const;
     bool may_read_metrics(const Request& request, const Client& client) const;

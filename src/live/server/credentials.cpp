@@ -213,6 +213,28 @@ std::string link_query(const LinkKeys& keys, std::string_view path, std::chrono:
            "&signature=" + hex_of(signature_of(key, number, path, seconds));
 }
 
+std::string link_segment(std::string_view query) {
+    const auto target = '?' + std::string(query);
+    const auto value = [&](const char* name) { return query_value(target, name).value_or(""); };
+    return value("expires") + '-' + value("key") + '-' + value("signature");
+}
+
+std::string link_target(std::string_view segment) {
+    std::array<std::string, 3> members;
+    std::size_t member = 0;
+    for (const char c : segment) {
+        const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
+        if (c == '-' && member < 2)
+            ++member;
+        else if (plain)
+            members[member] += c;
+        else
+            return "";
+    }
+    if (member < 2) return "";
+    return "?expires=" + members[0] + "&key=" + members[1] + "&signature=" + members[2];
+}
+
 LinkCheck check_link(const LinkKeys& keys, std::string_view path, std::string_view target,
                      std::chrono::system_clock::time_point now) {
     const auto expires = query_value(target, "expires"), key = query_value(target, "key"),

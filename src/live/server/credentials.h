@@ -52,6 +52,11 @@ Result<std::uint32_t> add_link_key(const std::string& path);
 // expires=UNIX_SECONDS&key=NUMBER&signature=HEX.
 std::string link_query(const LinkKeys& keys, std::string_view path, std::chrono::system_clock::time_point expires);
 
+// The same as a segment of a path, for what names others beside it: EXPIRES-KEY-SIGNATURE; and back, as a target with a
+// query. "" if it is none.
+std::string link_segment(std::string_view query);
+std::string link_target(std::string_view segment);
+
 enum class LinkCheck { good, missing, forged, expired };
 
 // target: the request's; only its query is read here.

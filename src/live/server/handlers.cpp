@@ -14,6 +14,7 @@
 #include "live/client/control.h"
 #include "live/server/live_connection.h"
 #include "live/server/metrics.h"
+#include "live/server/segment_handler.h"
 
 namespace htvm::live {
 namespace {
@@ -77,6 +78,7 @@ std::string stream_list(const Hub& hub) {
 std::string metrics_of(const Site& site) {
     return metrics_text({.hub = site.hub,
                          .recorder = site.recorder,
+                         .segments = site.segments,
                          .nats = site.nats ? std::optional(site.nats->counters()) : std::nullopt,
                          .refused = site.refusals.by_cause(),
                          .traffic = &site.traffic,
@@ -231,6 +233,8 @@ net::awaitable<Response> answer(const Site& site, const Route& route, const Requ
                 co_return refusing_response(*refusal, std::move(header));
             text = co_await site.texts->streams.fresh();
             co_return shared_response(std::move(text), json_type, std::move(header));
+        case Handler::segments:
+            co_return co_await answer_segments(site, route.path, request, std::move(header));
         case Handler::health:
             co_return text_response("ok\n", plain_text, std::move(header));
         case Handler::readiness:

@@ -12,6 +12,7 @@
 #include "live/hub/nats_peering.h"
 #include "live/server/admission.h"
 #include "live/server/http_request.h"
+#include "live/server/live_segments.h"
 #include "live/server/player_pages.h"
 #include "live/server/recorder.h"
 #include "live/server/refusals.h"
@@ -46,6 +47,7 @@ struct Site {
     PlayerPages pages{};
     Hub* hub = nullptr;                  // null: there are no live streams
     const Recorder* recorder = nullptr;  // null: nothing is recorded
+    LiveSegments* segments = nullptr;    // null: there are none of the live streams
     const NatsPeering* nats = nullptr;   // null: the hub is joined with no others
     SharedTexts* texts = nullptr;        // never null once somebody asks
     std::chrono::seconds stall_time{};   // for a client to take the next 64 KB of a response

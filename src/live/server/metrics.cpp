@@ -201,6 +201,27 @@ void add_nats(Metrics& metrics, const NatsCounters& nats) {
                     hubs.lost_claims);
 }
 
+void add_segments(Metrics& metrics, const MetricsSources& sources) {
+    if (!sources.segments) return;
+    const auto made = sources.segments->counters();
+    metrics.gauge("segments_streams", "Live streams that have segments, those included that ended lately",
+                  made.streams);
+    metrics.counter("segments_total", "Segments of live streams that were made", made.segments);
+    metrics.counter("segments_parts_total", "Parts of segments that were made", made.parts);
+    metrics.counter("segments_bytes_total", "Bytes of segments and maps that were made", made.bytes);
+    metrics.gauge("segments_held_bytes", "Of segments and maps, in memory", made.held_bytes);
+    metrics.counter("segments_lost_total", "Segments given up: no memory, or nowhere to start for too long", made.lost);
+    metrics.gauge("segments_waiting", "Requests that wait for what is not there yet", made.waiting);
+    metrics.counter("segments_refused_waiting_total", "Requests refused since too many waited", made.refused_waiting);
+    if (!sources.traffic) return;
+    const auto& traffic = *sources.traffic;
+    std::vector<Metrics::Sample> samples;
+    for (const auto& [what, count] : traffic.segment_requests) samples.push_back({what, number_text(count)});
+    metrics.add("segments_requests_total", "counter", "Requests for playlists, segments, maps and parts, by answer",
+                "answer", samples);
+    metrics.counter("segments_sent_bytes_total", "Bytes of the answers", traffic.segment_bytes);
+}
+
 }  // namespace
 
 std::string metrics_text(const MetricsSources& sources, Hub::Clock::time_point now) {
@@ -212,6 +233,7 @@ std::string metrics_text(const MetricsSources& sources, Hub::Clock::time_point n
     add_refused(metrics, sources);
     add_traffic(metrics, sources);
     if (sources.hub) add_hub(metrics, *sources.hub, now);
+    add_segments(metrics, sources);
     if (sources.nats) add_nats(metrics, *sources.nats);
     if (sources.recorder) {
         const auto recorded = sources.recorder->counters();

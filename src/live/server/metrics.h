@@ -10,6 +10,7 @@
 
 #include "live/hub/hub.h"
 #include "live/hub/nats_peering.h"
+#include "live/server/live_segments.h"
 #include "live/server/recorder.h"
 #include "live/server/traffic.h"
 
@@ -21,6 +22,7 @@ inline constexpr const char* metrics_type = "text/plain; version=0.0.4; charset=
 struct MetricsSources {
     const Hub* hub = nullptr;                         // null: there are no live streams
     const Recorder* recorder = nullptr;               // null: nothing is recorded
+    const LiveSegments* segments = nullptr;           // null: there are none of the live streams
     std::optional<NatsCounters> nats{};               // none: the hub is joined with no others
     std::map<std::string, std::uint64_t> refused{};   // requests and connections, by cause; besides the hub's own
     const Traffic* traffic = nullptr;                 // null: not counted

@@ -47,14 +47,6 @@ struct Shared {
     }
 };
 
-Packet packet_of(const LivePacket& packet) {
-    Packet out;
-    static_cast<PacketHeader&>(out) = packet.header;
-    out.payload.assign(packet.bytes.begin() + packet_header_bytes,
-                       packet.bytes.end() - (packet_overhead - packet_header_bytes));
-    return out;
-}
-
 // ---- A file that grows ----------------------------------------------------------------------------------------------
 
 // Waits until the disk has the name of a new file; what is in it is another matter. Not every file system can.

@@ -27,6 +27,9 @@ std::string_view media_type(std::string_view name) {
         {".json", "application/json"},
         {".png", "image/png"},
         {".jpg", "image/jpeg"},
+        {".m3u8", "application/vnd.apple.mpegurl"},
+        {".m4s", "video/mp4"},
+        {".mp4", "video/mp4"},
     };
     for (const auto& [ending, type] : types)
         if (name.ends_with(ending)) return type;

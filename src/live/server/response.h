@@ -23,6 +23,7 @@ struct Response {
     std::string own{};           // a text made for this response,
     std::string_view content{};  // or one that outlives it,
     SharedText::Text shared{};   // or one that several have,
+    SharedText::Text keeps{};    // or, in `content`, a part of this one,
     ServedFile file{};           // or a part of a file
     std::uint64_t first = 0, count = 0;
 };

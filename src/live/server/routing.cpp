@@ -20,6 +20,8 @@ const char* name_of(Handler handler) {
             return "file";
         case Handler::stream_list:
             return "stream_list";
+        case Handler::segments:
+            return "segments";
         case Handler::health:
             return "health";
         case Handler::readiness:
@@ -62,6 +64,10 @@ Route route_of(const Request& request, bool has_hub) {
     if (first == "files") {
         path->erase(path->begin());
         return {.handler = Handler::file, .path = std::move(*path)};
+    }
+    if (first == "hls" && has_hub) {
+        path->erase(path->begin());
+        return {.handler = Handler::segments, .path = std::move(*path)};
     }
     if (path->size() > 2) return {};
     auto& name = (*path)[1];

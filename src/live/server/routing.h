@@ -12,6 +12,8 @@
 //   /watch/NAME      packets for viewers
 //   /api/streams     the live streams as JSON; null where there is no hub
 //   /play/NAME       the page, which plays the live stream of that name
+//   /hls/NAME/...    with segments: the stream's playlist, stream.m3u8, and what it names; /hls/LINK/NAME/... where
+//                    links are asked for (live/server/segment_handler.h)
 //
 // For those who run it:
 //   /healthz         "ok": the server's thread runs
@@ -36,6 +38,7 @@ enum class Handler : std::uint8_t {
     file_list,
     file,
     stream_list,
+    segments,
     health,
     readiness,
     metrics,
@@ -50,7 +53,7 @@ const char* name_of(Handler handler);
 struct Route {
     Handler handler = Handler::nothing;
     std::string name{};               // of the live stream or of the player's file
-    std::vector<std::string> path{};  // of a file: its segments below /files/
+    std::vector<std::string> path{};  // of a file: its segments below /files/; of a live stream's segments: below /hls/
     bool socket = false;              // watch: by a WebSocket, as publish always is
 
     bool is_live() const { return handler == Handler::publish || handler == Handler::watch; }

@@ -22,6 +22,7 @@
 #include "live/client/line.h"
 #include "live/server/handlers.h"
 #include "live/server/http_connections.h"
+#include "live/server/live_segments.h"
 #include "live/server/recorder.h"
 #include "live/server/refusals.h"
 
@@ -166,6 +167,7 @@ struct Server::State {
                .pages = player_pages(),
                .hub = options.hub,
                .recorder = options.recorder,
+               .segments = options.segments,
                .stall_time = options.stall_time} {
         site.texts = &texts;
     }
@@ -255,6 +257,7 @@ net::awaitable<void> Server::State::tick_hub() {
         co_await timer.async_wait(awaited);
         traffic.late.add(std::chrono::steady_clock::now() - timer.expiry());
         options.hub->tick(Hub::Clock::now());
+        if (options.segments) options.segments->tick(Hub::Clock::now());
         if (options.recorder)
             for (const auto& event : options.recorder->new_events()) tell(event);
     }

@@ -32,6 +32,7 @@
 
 namespace htvm::live {
 
+class LiveSegments;
 class Recorder;
 
 struct ServerOptions {
@@ -52,6 +53,9 @@ struct ServerOptions {
     Hub* hub = nullptr;              // of live streams; null: there are none. It must outlive the server
     NatsOptions nats{};              // joins the hub with those of other machines
     Recorder* recorder = nullptr;    // keeps the live streams as files; null: none. It must outlive the server
+
+    // Offers the live streams as segments and playlists; null: not. It must outlive the server, and listens to the hub.
+    LiveSegments* segments = nullptr;
 
     AdmissionOptions admission{};
     // Addresses and networks whose word is taken for whom a connection or request is from (live/server/

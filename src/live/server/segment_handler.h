@@ -1,0 +1,28 @@
+// Answers requests for the segments of live streams, below /hls/:
+//
+//   NAME/stream.m3u8         the playlist; ?_HLS_msn=N&_HLS_part=P waits until it has that (HLS, second edition)
+//   NAME/map-HASH.mp4        what is needed before a segment
+//   NAME/NUMBER-HASH.m4s     a segment, and, with parts, NUMBER-TAG.PART.m4s, which waits if it is the one that is next
+//   LINK/NAME/...            the same where links are asked for: LINK is EXPIRES-KEY-SIGNATURE, of the path hls/NAME
+//   LINK/NAME/check          nothing but whether the link is good: 200, or 403 and a sentence. Caches ask this
+//
+// Names in playlists are relative, so whoever has the playlist by a link has all by it; and what a cache holds is the
+// same for all links.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <string>
+#include <vector>
+
+#include "live/server/http_request.h"
+#include "live/server/response.h"
+
+namespace htvm::live {
+
+struct Site;
+
+// path: the segments below /hls/.
+boost::asio::awaitable<Response> answer_segments(const Site& site, const std::vector<std::string>& path,
+                                                 const Request& request, ResponseHeader header);
+
+}  // namespace htvm::live
