@@ -145,8 +145,8 @@ net::awaitable<void> refuse(const Site& site, Line line, ResponseHeader header, 
 // What the authority says of what is refused otherwise: nothing if it lets it be.
 net::awaitable<std::optional<Refusal>> ask(const Site& site, const char* action, const std::string& stream,
                                            const Request& request, const Client& client, Refusal otherwise) {
-    const auto answer =
-        co_await site.authority->ask({action, stream, client.address.to_string(), shown_token(request)});
+    Question question{action, stream, client.address.to_string(), shown_token(request)};
+    const auto answer = co_await site.authority->ask(std::move(question));
     if (answer == Answer::yes) co_return std::nullopt;
     otherwise.cause = answer == Answer::no ? "authority" : "authority_silent";
     otherwise.why = "whom this hub asks does not allow it";
