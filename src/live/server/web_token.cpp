@@ -10,6 +10,7 @@
 #include <openssl/param_build.h>
 #include <openssl/pem.h>
 #include <openssl/rsa.h>
+#include <openssl/x509.h>
 
 #include <array>
 #include <cerrno>
@@ -162,18 +163,27 @@ bool read_key_set(const Json& json, WebTokenKeys& out) {
     return true;
 }
 
+// False if what is there is not public keys alone.
 bool read_pem(const std::string& text, WebTokenKeys& out) {
     const Owned<BIO, BIO_free_all> bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
-    while (bio) {
-        const std::shared_ptr<EVP_PKEY> key(PEM_read_bio_PUBKEY(bio.get(), nullptr, nullptr, nullptr), EVP_PKEY_free);
-        if (!key) break;
-        const auto fits = algorithm_of(key.get());
-        if (!fits) return false;
-        out.push_back({*fits, "", key});
+    char *name = nullptr, *header = nullptr;
+    std::uint8_t* data = nullptr;
+    long size = 0;
+    bool good = bio != nullptr;
+    while (good && PEM_read_bio(bio.get(), &name, &header, &data, &size) == 1) {
+        const std::uint8_t* der = data;
+        std::shared_ptr<EVP_PKEY> key(
+            std::string_view(name) == PEM_STRING_PUBLIC ? d2i_PUBKEY(nullptr, &der, size) : nullptr, EVP_PKEY_free);
+        const auto fits = key ? algorithm_of(key.get()) : std::nullopt;
+        good = fits.has_value();
+        if (good) out.push_back({*fits, "", std::move(key)});
+        OPENSSL_free(name);
+        OPENSSL_free(header);
+        OPENSSL_free(data);
     }
-    const bool all = ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
+    good = good && ERR_GET_REASON(ERR_peek_last_error()) == PEM_R_NO_START_LINE;
     ERR_clear_error();
-    return all;
+    return good;
 }
 
 // ---- Signatures -----------------------------------------------------------------------------------------------------
