@@ -202,8 +202,7 @@ net::awaitable<void> watch_by_socket(Line line, Request request, std::string nam
     std::optional<Hub::Viewer> watching;
     const auto wake = [&] {
         news.timer.cancel();
-        if (news.writing && watching && hub.ends_at_once(*watching))
-            connection->socket.next_layer().cut();
+        if (news.writing && watching && hub.ends_at_once(*watching)) connection->socket.next_layer().cut();
     };
     const auto viewer = hub.watch(name, wake, options, Hub::Clock::now());
     if (!viewer) {
