@@ -2,7 +2,9 @@
 // keys.
 #include "live/server/web_token.h"
 
+#include <openssl/ec.h>
 #include <openssl/evp.h>
+#include <openssl/rsa.h>
 #include <unistd.h>
 
 #include <cstdio>
