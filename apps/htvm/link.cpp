@@ -53,8 +53,8 @@ Result<void> link(const Options& options) {
         return fail(ErrorKind::bad_input,
                     fmt::format("{} is no address of a hub: https://HOST or http://HOST:PORT", hub));
     const auto path = (options.file ? "files/" : options.segments ? "hls/" : "watch/") + options.name;
-    const auto query =
-        live::link_query(*keys, path, std::chrono::system_clock::now() + std::chrono::seconds(options.seconds));
+    const auto query = live::link_query(
+        *keys, path, std::chrono::system_clock::now() + std::chrono::seconds(options.seconds), live::new_link_id());
     if (options.segments) {
         fmt::print("{}/hls/{}/{}/stream.m3u8\n", hub, live::link_segment(query), in_address(options.name));
         return {};
@@ -96,7 +96,7 @@ void add_link(CLI::App& app, Run& run) {
         ->excludes("--packets");
     command->footer(
         "Nobody can change the name or the time in a link. Whoever has it can pass it on; one that has expired ends\n"
-        "no viewer who is already watching.\n"
+        "no viewer who is already watching. Its id (id=...) in a file that htvm serve --revoked reads takes it back.\n"
         "Example:\n"
         "  htvm link anna --for 2h --keys keys.json --url https://hub.example");
     command->callback([options, &run] { run = [options] { return link(*options); }; });

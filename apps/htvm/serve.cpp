@@ -206,7 +206,8 @@ Result<void> serve(const Options& options) {
         fmt::print("{}\n", address);
         std::fflush(stdout);
     }
-    if (server.admission.publishers.empty())
+    const bool asks = !server.admission.web_token_keys.empty() || !server.authority.url.empty();
+    if (server.admission.publishers.empty() && !(asks && server.admission.guard_publishing))
         log({.name = "publishing_open",
              .text = "no publishers are known: programs on this machine may publish, under any name, and nobody else"});
     opened->run();
@@ -316,6 +317,48 @@ void add_access_options(CLI::App& command, Options& options) {
     command.add_flag("--same-site", options.same_site, "Pages of no other site may read and watch")->excludes(origins);
 }
 
+void add_others_word(CLI::App& command, Options& options) {
+    auto& admission = options.server.admission;
+    command
+        .add_option(
+            "--revoked", admission.revoked,
+            "Links and tokens that were taken back: a file of their ids, a line each (htvm link writes id=ID into "
+            "links; JWT: jti)")
+        ->type_name("FILE");
+    auto* keys = command
+                     .add_option("--jwt-keys", admission.web_token_keys,
+                                 "Who shows a token (JWT, RS256 or ES256) that one of these public keys signed may "
+                                 "publish and watch what it names (PEM or JWKS)")
+                     ->type_name("FILE");
+    command
+        .add_option("--jwt-audience", admission.web_token_audience,
+                    "What the tokens' aud must name (default: tokens have none)")
+        ->type_name("TEXT")
+        ->needs(keys);
+    auto* authority =
+        command
+            .add_option("--auth", options.server.authority.url,
+                        "Ask this web service, http:// or https://, who may publish and watch: it is sent a "
+                        "POST of JSON, and answers 200 or 403")
+            ->type_name("URL");
+    command
+        .add_option_function<unsigned>(
+            "--auth-time", [&options](unsigned given) { options.server.authority.time = std::chrono::seconds(given); },
+            "Seconds for its answer (default 5); without one nobody is let in")
+        ->check(CLI::Range(1, 60))
+        ->needs(authority);
+    command
+        .add_option_function<std::string>(
+            "--auth-for",
+            [&admission](const std::string& what) {
+                admission.guard_publishing = what != "watch";
+                admission.guard_watching = what != "publish";
+            },
+            "What --jwt-keys and --auth are for: publish, watch, or both (default both)")
+        ->type_name("WHAT")
+        ->check(CLI::IsMember({"publish", "watch", "both"}));
+}
+
 void add_proxies(CLI::App& command, Options& options) {
     auto& server = options.server;
     auto* trusted = command
@@ -391,6 +434,11 @@ void add_limits(CLI::App& command, Options& options) {
         command.add_option(name, limit, fmt::format("{} (default {})", text, limit))->check(CLI::Range(1, 1000000));
     };
     auto& server = options.server;
+    command
+        .add_option("--threads", server.line_threads,
+                    "Threads, beside the hub's own, over which what connections read, write and encrypt is spread "
+                    "(default 0: the hub's own does it)")
+        ->check(CLI::Range(0, 256));
     add("--connections", server.admission.connections, "Connections at once");
     add("--connections-per-address", server.admission.connections_per_address,
         "Of these from one address; an IPv6 network /64 is one");
@@ -451,6 +499,7 @@ void add_serve(CLI::App& app, Run& run) {
     add_nats_options(*command, server.nats);
     under("Who may publish and watch");
     add_access_options(*command, *options);
+    add_others_word(*command, *options);
     under("Behind other servers");
     add_proxies(*command, *options);
     under("Caches before the hub");

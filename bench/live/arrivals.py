@@ -5,7 +5,7 @@ ARRIVAL = np.dtype([("arrived", "<i8"), ("sent", "<i8"), ("viewer", "<u4"), ("fr
                     ("kind", "u1"), ("lacking", "u1"), ("unused", "u1", 2)])
 CONNECTING, CLOSED = 200, 201
 INTRA = 2
-FRAMES = (2, 3, 6, 7)  # kinds of packets that hold a frame
+FRAMES = (2, 3, 6, 7, 11)  # kinds of packets that hold a frame
 STALL_SECONDS = 1.0
 LIVE_SECONDS = 0.25  # a viewer who joined has caught up with what happens once a frame comes within this
 

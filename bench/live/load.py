@@ -43,6 +43,7 @@ def measure(options, viewers):
     slow = round(viewers * options.slow / 100)
     with tempfile.TemporaryDirectory() as folder, \
             hubs.hub(options.htvm, "--connections", viewers + 16,
+                     *(["--threads", options.threads] if options.threads else []),
                      *(hubs.certificate(folder) if options.tls else [])) as (hub, port), \
             hubs.publisher(stream, "person", port, tls=options.tls) as publisher:
         time.sleep(1.5)
@@ -121,6 +122,7 @@ def main():
                         "rate; they do not count in the delays (default 5)")
     parser.add_argument("--most", type=float, default=50, help="milliseconds (default 50)")
     parser.add_argument("--tls", action="store_true", help="publisher and viewers connect by TLS")
+    parser.add_argument("--threads", type=int, default=0, help="of the hub, beside its own (default 0)")
     parser.add_argument("--lost", choices=[*hub_lost.CASES, "each"], help="instead, what these viewers (default 1000) "
                         "watch through is lost, one of three hubs that NATS joins, or NATS itself: how soon they are "
                         "back. " + "; ".join(f"{name}: {case.what}" for name, case in hub_lost.CASES.items()))

@@ -6,7 +6,9 @@ section 2).
 usage: takeover.py HTVM LIVE_WATCH [--viewers 200] [--event publisher|reload|hub]
 
 For each event it prints how many viewers were back, the longest pause between two frames of any viewer (and of half of
-them, and of 99 in 100), and how many were told that the stream has ended.
+them, and of 99 in 100), how many frames they were not sent though their numbers show that there were some (a publisher
+that is started again begins with number 0, so what it would have sent meanwhile does not count), and how many were told
+that the stream has ended.
 """
 import argparse
 import contextlib
@@ -76,6 +78,20 @@ def measure(options, event):
         return result_of(arrivals.read(noted), options.viewers, since)
 
 
+def lost_by(own, since):
+    """Frames that this viewer was not sent though the numbers of those it was sent show that there were some. Whoever
+    connects again is sent first what the newest frame refers to: what it had before counts no more."""
+    lost, last, joins = 0, None, False
+    for kind, number, arrived in zip(own["kind"], own["frame"].astype(np.int64), own["arrived"]):
+        if kind == arrivals.CONNECTING:
+            joins = True
+        elif kind in arrivals.FRAMES and not (joins and last is not None and number <= last):
+            if last is not None and number > last + 1 and arrived > since - 1e6:
+                lost += int(number - last - 1)
+            last, joins = number, False
+    return lost
+
+
 def result_of(noted, viewers, since):
     shown = arrivals.frames(noted)
     pauses, back = [], 0
@@ -84,10 +100,12 @@ def result_of(noted, viewers, since):
         back += bool(times[-1] > since + 1e6 * (AFTER_SECONDS - 2))
         around = times[(times > since - 1e6)]
         pauses.append(float(np.diff(around).max()) / 1e6 if len(around) > 1 else float("inf"))
+    lost = [lost_by(own, since) for own in arrivals.of_each_viewer(noted).values()]
     later = noted[noted["arrived"] >= since]
     closed = later[later["kind"] == arrivals.CLOSED]
     return {"viewers": viewers, "back": back, "pause p50, s": round(arrivals.percentile(pauses, 50), 3),
             "pause p99, s": round(arrivals.percentile(pauses, 99), 3), "longest pause, s": round(max(pauses), 3),
+            "frames lost": sum(lost), "by one viewer at most": max(lost),
             "connected again": int(sum(later["kind"] == arrivals.CONNECTING)),
             "told that it ended": int(sum(closed["frame"] == ENDED))}
 

@@ -24,6 +24,7 @@ protected:
         EXPECT_TRUE(mkdtemp(name.data()));
         root = name;
         options.folder = (root / "served").string();
+        options.line_threads = line_threads();
         std::filesystem::create_directory(options.folder);
     }
     ~ServerTest() override { std::filesystem::remove_all(root); }
@@ -78,6 +79,12 @@ protected:
         if (at == std::string::npos || at > response.find("\r\n\r\n")) return "";
         const auto begin = at + name.size() + 4;
         return response.substr(begin, response.find("\r\n", begin) - begin);
+    }
+
+    // How ./dev races asks for servers with threads for their lines.
+    static unsigned line_threads() {
+        const char* asked = std::getenv("HTVM_LINE_THREADS");
+        return asked ? static_cast<unsigned>(std::atoi(asked)) : 0;
     }
 
     std::filesystem::path root;

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The threaded code under the thread sanitizer: tests/races/run.sh BUILD JOBS
 # BUILD: a folder built with HTVM_SANITIZE=thread. Runs the tests of the codec and of what is below it, JOBS parts of each
-# at a time, then encodes and decodes on the command line with four threads. Fails if two threads race.
+# at a time, and those of servers, then encodes and decodes on the command line with four threads. Fails if two threads race.
 set -euo pipefail
 build=$(realpath "$1") jobs=$2
 export TSAN_OPTIONS=halt_on_error=1:exitcode=66:${TSAN_OPTIONS:-}
@@ -35,6 +35,9 @@ test_in_parts() {
 }
 
 for name in test_core test_entropy test_surface test_c_api test_codec; do test_in_parts "$name"; done
+# Servers, each with two threads for its connections.
+HTVM_LINE_THREADS=2 check "test_live" "$build/test_live" --gtest_brief=1 \
+    --gtest_filter='LineThreads*:HttpServer*:ServerAccess*:Asked*:LiveConnection*:CLive*' || failures=$((failures + 1))
 
 htvm=$build/htvm
 "$htvm" synth "$logs/capture" --frames 12 --vertices 4000 >"$logs/synth.log" 2>&1

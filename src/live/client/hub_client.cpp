@@ -122,7 +122,7 @@ struct Connection {
         ended = true;
         wake();
         beats.cancel();
-        beast::get_lowest_layer(socket).close();
+        socket.next_layer().cut();
     }
 };
 using SharedConnection = std::shared_ptr<Connection>;
@@ -196,11 +196,11 @@ net::awaitable<std::optional<HubEnding>> HubClient::State::connect(const HubAddr
         if (!is_ip_address(address.host)) SSL_set_tlsext_host_name(secure->native_handle(), address.host.c_str());
         secure->set_verify_mode(options.insecure ? ssl::verify_none : ssl::verify_peer);
         if (!options.insecure) secure->set_verify_callback(ssl::host_name_verification(address.host));
-        line.next_layer().expires_after(options.handshake);
+        line.expires_after(options.handshake);
         if (const auto error = co_await line.handshake(ssl::stream_base::client); error) co_return by_tls(line, error);
     }
-    line.next_layer().expires_never();
-    keep_kernel_buffers_small(line);
+    line.expires_never();
+    line.keep_kernel_buffers_small();
     auto its = std::make_shared<Connection>(std::move(line));
     auto& socket = its->socket;
     socket.set_option(websocket::stream_base::timeout{options.handshake, websocket::stream_base::none(), false});

@@ -52,6 +52,11 @@ bool names_origin(std::string_view origin, std::string_view host) {
 
 }  // namespace
 
+std::string shown_token(const Request& request) {
+    auto token = std::string(bearer_token(request[http::field::authorization]));
+    return token.empty() ? query_value(request.target(), "token").value_or("") : token;
+}
+
 bool is_loopback(const std::string& address) {
     boost::system::error_code error;
     const auto parsed = net::ip::make_address(address, error);
@@ -69,6 +74,16 @@ Result<Credentials> read_credentials(const AdmissionOptions& options) {
         auto keys = read_link_keys(options.link_keys);
         if (!keys) return tl::unexpected(keys.error());
         out.link_keys = std::move(*keys);
+    }
+    if (!options.web_token_keys.empty()) {
+        auto keys = read_web_token_keys(options.web_token_keys);
+        if (!keys) return tl::unexpected(keys.error());
+        out.web_token_keys = std::move(*keys);
+    }
+    if (!options.revoked.empty()) {
+        auto revoked = read_revocations(options.revoked);
+        if (!revoked) return tl::unexpected(revoked.error());
+        out.revoked = std::move(*revoked);
     }
     return out;
 }
@@ -134,39 +149,67 @@ bool Admission::by_program_here(const Request& request, const Client& client) co
     return counted_address(client.address).is_loopback() && !client.by_proxy && !page_elsewhere && !forwarded;
 }
 
-// "" if nothing stands against it.
-std::string Admission::why_not_publish(const Request& request, const std::string& stream, const Client& client) const {
-    if (credentials_.publishers) {
-        auto token = std::string(bearer_token(request[http::field::authorization]));
-        if (token.empty()) token = query_value(request.target(), "token").value_or("");
-        if (token.empty()) return "publishing needs a token: Authorization: Bearer TOKEN";
-        return may_publish(*credentials_.publishers, stream, token)
-                   ? ""
-                   : "this token is not that of the stream's publisher";
-    }
-    if (by_program_here(request, client)) return "";
-    return "this hub knows no publishers: only programs on its own machine may publish";
+// Nothing if it is no web token, or none are taken.
+std::optional<WebTokenCheck> Admission::check_token(std::string_view token, const char* action,
+                                                    std::string_view stream) const {
+    if (!credentials_.web_token_keys || !looks_like_web_token(token)) return std::nullopt;
+    return check_web_token(*credentials_.web_token_keys, credentials_.revoked, token,
+                           {.action = action, .stream = stream, .audience = options_.web_token_audience},
+                           std::chrono::system_clock::now());
 }
 
 std::optional<Refusal> Admission::refuse_publishing(const Request& request, const std::string& stream,
                                                     const Client& client) const {
     if (!is_stream_name(stream)) return Refusal{"name", stream_name_rule, http::status::bad_request};
     if (!origin_allowed(request)) return Refusal{"origin", "pages of this site may not publish here"};
-    const auto why = why_not_publish(request, stream, client);
-    if (why.empty()) return std::nullopt;
-    if (!credentials_.publishers) return Refusal{"token", why};
-    return Refusal{"token", why, http::status::unauthorized, CloseCode::refused, options_.refusal_delay};
+    const bool authority = options_.authority && options_.guard_publishing;
+    const bool web_tokens = credentials_.web_token_keys && options_.guard_publishing;
+    if (!authority && !web_tokens && !credentials_.publishers) {
+        if (by_program_here(request, client)) return std::nullopt;
+        return Refusal{"token", "this hub knows no publishers: only programs on its own machine may publish"};
+    }
+    const auto token = shown_token(request);
+    if (credentials_.publishers && !token.empty() && may_publish(*credentials_.publishers, stream, token))
+        return std::nullopt;
+    const auto check = web_tokens ? check_token(token, "publish", stream) : std::nullopt;
+    if (check == WebTokenCheck::good) return std::nullopt;
+    const char* why = token.empty() ? "publishing needs a token: Authorization: Bearer TOKEN"
+                      : check       ? web_token_sentence(*check)
+                                    : "this token is not that of the stream's publisher";
+    return Refusal{.cause = "token",
+                   .why = why,
+                   .status = http::status::unauthorized,
+                   .delay = options_.refusal_delay,
+                   .may_be_asked = authority && check != WebTokenCheck::revoked};
 }
 
-tl::expected<AddressCounts::Place, Refusal> Admission::admit_viewer(const Request& request, const std::string& stream,
-                                                                    bool socket, const Client& client) {
-    if (socket && !origin_allowed(request))
-        return tl::unexpected(Refusal{"origin", "pages of this site may not watch here"});
-    if (auto refusal = refuse_path("watch/" + stream, request)) return tl::unexpected(std::move(*refusal));
+std::optional<Refusal> Admission::refuse_watching(const Request& request, const std::string& stream,
+                                                  bool socket) const {
+    if (socket && !origin_allowed(request)) return Refusal{"origin", "pages of this site may not watch here"};
+    auto by_link = refuse_path("watch/" + stream, request);
+    if (!guards_watching() || (asks_for_links() && !by_link)) return by_link;
+    const auto token = shown_token(request);
+    const auto check = check_token(token, "watch", stream);
+    if (check == WebTokenCheck::good) return std::nullopt;
+    const bool by_token = check || !by_link;
+    Refusal out = by_token ? Refusal{"token", check ? web_token_sentence(*check)
+                                                    : "watching needs a token: Authorization: Bearer TOKEN, or ?token="}
+                           : std::move(*by_link);
+    out.may_be_asked = options_.authority && out.cause != "link_revoked" && check != WebTokenCheck::revoked;
+    return out;
+}
+
+tl::expected<AddressCounts::Place, Refusal> Admission::place_for_viewer(const Client& client) {
     if (viewers_.at(client.address) >= options_.viewers_per_address)
         return tl::unexpected(Refusal{"address", "this address has as many viewers as it may",
                                       http::status::service_unavailable, CloseCode::try_later});
     return AddressCounts::Place(viewers_, client.address);
+}
+
+tl::expected<AddressCounts::Place, Refusal> Admission::admit_viewer(const Request& request, const std::string& stream,
+                                                                    bool socket, const Client& client) {
+    if (auto refusal = refuse_watching(request, stream, socket)) return tl::unexpected(std::move(*refusal));
+    return place_for_viewer(client);
 }
 
 std::optional<Refusal> Admission::refuse_path(const std::string& path, const Request& request) const {
@@ -175,17 +218,20 @@ std::optional<Refusal> Admission::refuse_path(const std::string& path, const Req
 
 std::optional<Refusal> Admission::refuse_link(const std::string& path, std::string_view target) const {
     if (!credentials_.link_keys) return std::nullopt;
-    const auto check = check_link(*credentials_.link_keys, path, target, std::chrono::system_clock::now());
+    const auto check = check_link(*credentials_.link_keys, path, target, std::chrono::system_clock::now(),
+                                  credentials_.revoked);
     if (check == LinkCheck::good) return std::nullopt;
     const char* cause = check == LinkCheck::missing   ? "link_missing"
                         : check == LinkCheck::expired ? "link_expired"
+                        : check == LinkCheck::revoked ? "link_revoked"
                                                       : "link_forged";
     return Refusal{cause, link_sentence(check)};
 }
 
 std::optional<Refusal> Admission::refuse_lists() const {
-    if (!credentials_.link_keys) return std::nullopt;
-    return Refusal{"link_missing", "this hub tells nobody what there is: it asks for links"};
+    if (asks_for_links()) return Refusal{"link_missing", "this hub tells nobody what there is: it asks for links"};
+    if (guards_watching()) return Refusal{"token", "this hub tells nobody what there is: it asks for tokens"};
+    return std::nullopt;
 }
 
 bool Admission::may_read_metrics(const Request& request, const Client& client) const {

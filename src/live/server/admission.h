@@ -1,6 +1,8 @@
 // Who may: which connections are let in, which requests are answered, who publishes and who watches. A request is
 // judged by where it comes from (its address, and the host and the origin that it names) and by what it shows: a token
-// or a link (live/server/credentials.h). What is answered and how is no business of this file.
+// or a link (live/server/credentials.h, live/server/web_token.h). Where these do not let it in and there is an
+// authority (live/server/authority.h), the refusal says that it may be asked. What is answered and how is no business
+// of this file.
 #pragma once
 
 #include <boost/asio/ip/address.hpp>
@@ -18,7 +20,9 @@
 #include "live/server/http_request.h"
 #include "live/server/refusals.h"
 #include "live/server/response.h"
+#include "live/server/revocations.h"
 #include "live/server/trusted_proxies.h"
+#include "live/server/web_token.h"
 
 namespace htvm::live {
 
@@ -37,7 +41,17 @@ struct AdmissionOptions {
     // Files (live/server/credentials.h).
     std::string publishers{};  // who may publish what; "": programs on this machine, anything
     std::string link_keys{};   // of links, without which nothing can be watched; "": anyone may watch
+    std::string revoked{};     // links and web tokens that were taken back; "": none (live/server/revocations.h)
+    // Public keys of web tokens (live/server/web_token.h), which let publish and watch besides; "": there are none. The
+    // audience that they must name; "": they must name none.
+    std::string web_token_keys{}, web_token_audience{};
+    bool authority = false;  // there is one, which may let publish and watch besides
+    // What web tokens and the authority are for. What they are not for is decided by the rest, as if there were none.
+    bool guard_publishing = true, guard_watching = true;
 };
+
+// The token that a request shows: in its header Authorization, or else as ?token=; "" if none.
+std::string shown_token(const Request& request);
 
 // Whether what listens on this address can be reached from this machine alone.
 bool is_loopback(const std::string& address);
@@ -46,6 +60,8 @@ bool is_loopback(const std::string& address);
 struct Credentials {
     std::optional<Publishers> publishers{};  // none: programs on this machine
     std::optional<LinkKeys> link_keys{};     // none: anyone may watch
+    std::optional<WebTokenKeys> web_token_keys{};
+    Revocations revoked{};
 };
 // bad_input if one of the files is not as it should be.
 Result<Credentials> read_credentials(const AdmissionOptions& options);
@@ -102,7 +118,11 @@ public:
     // Why somebody may not publish the stream, if so.
     std::optional<Refusal> refuse_publishing(const Request& request, const std::string& stream,
                                              const Client& client) const;
-    // A place for another viewer of the stream. socket: it asks for a WebSocket.
+    // Why somebody may not watch the stream, if so. socket: they ask for a WebSocket.
+    std::optional<Refusal> refuse_watching(const Request& request, const std::string& stream, bool socket) const;
+    // A place for another viewer who may watch.
+    tl::expected<AddressCounts::Place, Refusal> place_for_viewer(const Client& client);
+    // Both.
     tl::expected<AddressCounts::Place, Refusal> admit_viewer(const Request& request, const std::string& stream,
                                                              bool socket, const Client& client);
     // Why the request may not read what is at this path, such as "files/anna.htvm", if so: there is need of a link.
@@ -122,7 +142,12 @@ private:
     bool names_loopback(std::string_view host) const;
     bool by_program_here(const Request& request, const Client& client) const;
     bool origin_allowed(const Request& request) const;
-    std::string why_not_publish(const Request& request, const std::string& stream, const Client& client) const;
+    bool asks_for_links() const { return credentials_.link_keys.has_value(); }
+    // By web tokens, or by the authority; links are another thing.
+    bool guards_watching() const {
+        return options_.guard_watching && (credentials_.web_token_keys || options_.authority);
+    }
+    std::optional<WebTokenCheck> check_token(std::string_view token, const char* action, std::string_view stream) const;
 
     AdmissionOptions options_;
     Credentials credentials_;

@@ -73,10 +73,10 @@ std::array<std::uint8_t, 32> hash_of(std::span<const std::uint8_t> salt, std::st
 }
 
 std::array<std::uint8_t, 32> signature_of(const LinkKey& key, std::uint32_t number, std::string_view path,
-                                          std::uint64_t expires) {
-    // A path holds no line's end, so no two links are signed as the same text.
-    const auto text =
-        "htvm link\n" + std::string(path) + '\n' + std::to_string(expires) + '\n' + std::to_string(number);
+                                          std::uint64_t expires, const std::optional<std::string>& id) {
+    // A path holds no line's end, nor does an id, so no two links are signed as the same text.
+    const auto text = "htvm link\n" + std::string(path) + '\n' + std::to_string(expires) + '\n' +
+                      std::to_string(number) + (id ? '\n' + *id : "");
     std::array<std::uint8_t, 32> out{};
     unsigned length = 0;
     // It fails only for want of memory; a signature that anyone could guess must not come of that.
@@ -205,40 +205,45 @@ Result<std::uint32_t> add_link_key(const std::string& path) {
     return number;
 }
 
-std::string link_query(const LinkKeys& keys, std::string_view path, std::chrono::system_clock::time_point expires) {
+std::string new_link_id() { return hex_of(random_bytes<8>()); }
+
+std::string link_query(const LinkKeys& keys, std::string_view path, std::chrono::system_clock::time_point expires,
+                       const std::string& id) {
     const auto& [number, key] = *keys.rbegin();
     const auto seconds = static_cast<std::uint64_t>(
         std::max<std::int64_t>(0, std::chrono::floor<std::chrono::seconds>(expires).time_since_epoch().count()));
-    return "expires=" + std::to_string(seconds) + "&key=" + std::to_string(number) +
-           "&signature=" + hex_of(signature_of(key, number, path, seconds));
+    const auto signed_id = id.empty() ? std::nullopt : std::optional(id);
+    return "expires=" + std::to_string(seconds) + "&key=" + std::to_string(number) + (id.empty() ? "" : "&id=" + id) +
+           "&signature=" + hex_of(signature_of(key, number, path, seconds, signed_id));
 }
 
 std::string link_segment(std::string_view query) {
     const auto target = '?' + std::string(query);
     const auto value = [&](const char* name) { return query_value(target, name).value_or(""); };
-    return value("expires") + '-' + value("key") + '-' + value("signature");
+    const auto id = value("id");
+    return value("expires") + '-' + value("key") + '-' + (id.empty() ? "" : id + '-') + value("signature");
 }
 
 std::string link_target(std::string_view segment) {
-    std::array<std::string, 3> members;
-    std::size_t member = 0;
+    std::vector<std::string> members(1);
     for (const char c : segment) {
-        const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
-        if (c == '-' && member < 2)
-            ++member;
+        const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+        if (c == '-' && members.size() < 4)
+            members.emplace_back();
         else if (plain)
-            members[member] += c;
+            members.back() += c;
         else
             return "";
     }
-    if (member < 2) return "";
-    return "?expires=" + members[0] + "&key=" + members[1] + "&signature=" + members[2];
+    if (members.size() < 3) return "";
+    const auto id = members.size() == 4 ? "&id=" + members[2] : "";
+    return "?expires=" + members[0] + "&key=" + members[1] + id + "&signature=" + members.back();
 }
 
 LinkCheck check_link(const LinkKeys& keys, std::string_view path, std::string_view target,
-                     std::chrono::system_clock::time_point now) {
+                     std::chrono::system_clock::time_point now, const Revocations& revoked) {
     const auto expires = query_value(target, "expires"), key = query_value(target, "key"),
-               signature = query_value(target, "signature");
+               id = query_value(target, "id"), signature = query_value(target, "signature");
     if (!expires && !key && !signature) return LinkCheck::missing;
     if (!expires || !key || !signature) return LinkCheck::forged;
     const auto seconds = whole_number(*expires), number = whole_number(*key);
@@ -246,8 +251,9 @@ LinkCheck check_link(const LinkKeys& keys, std::string_view path, std::string_vi
     if (!seconds || !number || *number > UINT32_MAX || !from_hex(*signature, given)) return LinkCheck::forged;
     const auto found = keys.find(static_cast<std::uint32_t>(*number));
     if (found == keys.end()) return LinkCheck::forged;
-    const auto right = signature_of(found->second, found->first, path, *seconds);
+    const auto right = signature_of(found->second, found->first, path, *seconds, id);
     if (CRYPTO_memcmp(given.data(), right.data(), right.size()) != 0) return LinkCheck::forged;
+    if (id && revoked.contains(*id)) return LinkCheck::revoked;
     const auto today = std::chrono::floor<std::chrono::seconds>(now).time_since_epoch().count();
     return today >= 0 && static_cast<std::uint64_t>(today) >= *seconds ? LinkCheck::expired : LinkCheck::good;
 }
@@ -262,6 +268,8 @@ const char* link_sentence(LinkCheck check) {
             return "this link is not one that this hub knows: it is incomplete, changed, or by a key no longer in use";
         case LinkCheck::expired:
             return "this link has expired: ask for a new one";
+        case LinkCheck::revoked:
+            return "this link was taken back: ask for a new one";
     }
     return "";
 }

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "htvm/result.hpp"
+#include "live/server/revocations.h"
 
 namespace htvm::live {
 
@@ -49,19 +50,23 @@ Result<LinkKeys> read_link_keys(const std::string& path);
 Result<std::uint32_t> add_link_key(const std::string& path);
 
 // The query of a link to what the hub has at this path, such as "watch/anna" or "files/anna.htvm", by the newest key:
-// expires=UNIX_SECONDS&key=NUMBER&signature=HEX.
-std::string link_query(const LinkKeys& keys, std::string_view path, std::chrono::system_clock::time_point expires);
+// expires=UNIX_SECONDS&key=NUMBER&id=ID&signature=HEX. id: by which the link can be taken back, of letters and digits;
+// "": it has none and cannot be.
+std::string link_query(const LinkKeys& keys, std::string_view path, std::chrono::system_clock::time_point expires,
+                       const std::string& id = "");
+// A random one.
+std::string new_link_id();
 
-// The same as a segment of a path, for what names others beside it: EXPIRES-KEY-SIGNATURE; and back, as a target with a
+// The same as a segment of a path, for what names others beside it: EXPIRES-KEY-ID-SIGNATURE, without ID where there is none; and back, as a target with a
 // query. "" if it is none.
 std::string link_segment(std::string_view query);
 std::string link_target(std::string_view segment);
 
-enum class LinkCheck { good, missing, forged, expired };
+enum class LinkCheck { good, missing, forged, expired, revoked };
 
 // target: the request's; only its query is read here.
 LinkCheck check_link(const LinkKeys& keys, std::string_view path, std::string_view target,
-                     std::chrono::system_clock::time_point now);
+                     std::chrono::system_clock::time_point now, const Revocations& revoked = {});
 
 // What to tell the viewer.
 const char* link_sentence(LinkCheck check);

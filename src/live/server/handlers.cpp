@@ -80,6 +80,7 @@ std::string metrics_of(const Site& site) {
                          .recorder = site.recorder,
                          .segments = site.segments,
                          .nats = site.nats ? std::optional(site.nats->counters()) : std::nullopt,
+                         .authority = site.authority ? &site.authority->counters() : nullptr,
                          .refused = site.refusals.by_cause(),
                          .traffic = &site.traffic,
                          .ready = !site.ending,
@@ -143,8 +144,25 @@ net::awaitable<void> refuse(const Site& site, Line line, ResponseHeader header, 
     co_await line.close();
 }
 
+// What the authority says of what is refused otherwise: nothing if it lets it be.
+net::awaitable<std::optional<Refusal>> ask(const Site& site, const char* action, const std::string& stream,
+                                           const Request& request, const Client& client, Refusal otherwise) {
+    Question question{action, stream, client.address.to_string(), shown_token(request)};
+    const auto answer = co_await site.authority->ask(std::move(question));
+    if (answer == Answer::yes) co_return std::nullopt;
+    otherwise.cause = answer == Answer::no ? "authority" : "authority_silent";
+    otherwise.why = "whom this hub asks does not allow it";
+    if (answer == Answer::no) co_return otherwise;
+    otherwise.why = "this hub has no answer yet from whom it asks whether this is allowed";
+    otherwise.status = http::status::service_unavailable;
+    otherwise.code = CloseCode::try_later;
+    co_return otherwise;
+}
+
 net::awaitable<void> publish(const Site& site, Line line, Request request, std::string stream, Client client) {
-    const auto refusal = site.admission.refuse_publishing(request, stream, client);
+    auto refusal = site.admission.refuse_publishing(request, stream, client);
+    if (refusal && refusal->may_be_asked)
+        refusal = co_await ask(site, "publish", stream, request, client, std::move(*refusal));
     if (!refusal) {
         co_await publish_by_socket(std::move(line), std::move(request), std::move(stream), *site.hub);
         co_return;
@@ -162,7 +180,11 @@ net::awaitable<void> publish(const Site& site, Line line, Request request, std::
 net::awaitable<void> watch(const Site& site, Line line, Request request, Route route, Client client) {
     auto header = common_header(site);
     site.admission.let_others_read(request, header);
-    const auto place = site.admission.admit_viewer(request, route.name, route.socket, client);
+    auto refused = site.admission.refuse_watching(request, route.name, route.socket);
+    if (refused && refused->may_be_asked)
+        refused = co_await ask(site, "watch", route.name, request, client, std::move(*refused));
+    using Place = tl::expected<AddressCounts::Place, Refusal>;
+    const auto place = refused ? Place(tl::unexpect, *refused) : site.admission.place_for_viewer(client);
     if (!place) {
         const auto refusal = place.error();
         site.refusals.tell(refusal, route.name, client.address);

@@ -11,6 +11,7 @@
 #include "live/hub/hub.h"
 #include "live/hub/nats_peering.h"
 #include "live/server/admission.h"
+#include "live/server/authority.h"
 #include "live/server/http_request.h"
 #include "live/server/live_segments.h"
 #include "live/server/player_pages.h"
@@ -49,6 +50,7 @@ struct Site {
     const Recorder* recorder = nullptr;  // null: nothing is recorded
     LiveSegments* segments = nullptr;    // null: there are none of the live streams
     const NatsPeering* nats = nullptr;   // null: the hub is joined with no others
+    Authority* authority = nullptr;      // null: there is none
     SharedTexts* texts = nullptr;        // never null once somebody asks
     std::chrono::seconds stall_time{};   // for a client to take the next 64 KB of a response
     Hub::Clock::time_point started = Hub::Clock::now();

@@ -28,7 +28,7 @@ public:
         timer_.async_wait([&line, state = state_](const beast::error_code& cancelled) {
             if (cancelled || !state->waits) return;
             state->late = true;
-            line.next_layer().cancel();
+            line.cancel();
         });
     }
     Deadline(const Deadline&) = delete;
@@ -57,7 +57,7 @@ std::string_view path_of(const Request& request) {
 }  // namespace
 
 net::awaitable<void> HttpConnections::serve(Line line, net::ip::address address) {
-    line.next_layer().expires_after(header_time_);
+    line.expires_after(header_time_);
     auto client = Client(address);
     std::optional<AddressCounts::Place> place;
     const auto take_place = [&](const net::ip::address& of) {
@@ -92,6 +92,7 @@ net::awaitable<void> HttpConnections::serve(Line line, net::ip::address address)
 
 // Whom the proxy connects, or the proxy itself; nothing if it does not say so as it should.
 net::awaitable<std::optional<Client>> HttpConnections::read_proxy_header(Line& line, const net::ip::address& address) {
+    Line::BelowTls below_tls(line);
     std::vector<std::uint8_t> bytes;
     for (;;) {
         const auto needed = proxy_header_needs(bytes);
@@ -100,7 +101,7 @@ net::awaitable<std::optional<Client>> HttpConnections::read_proxy_header(Line& l
         if (needed) {
             bytes.resize(had + *needed);
             const auto [error, got] =
-                co_await net::async_read(line.next_layer(), net::buffer(bytes.data() + had, *needed), awaited);
+                co_await net::async_read(below_tls, net::buffer(bytes.data() + had, *needed), awaited);
             if (!error) continue;
         }
         site_.refusals.tell({"proxy_header", "the proxy does not begin with a header of the PROXY protocol"}, "",
@@ -117,7 +118,7 @@ net::awaitable<HttpConnections::RequestRead> HttpConnections::read_request(Line&
                                                                            const net::ip::address& address) {
     http::request_parser<http::empty_body> parser;
     parser.header_limit(header_limit);
-    line.next_layer().expires_never();
+    line.expires_never();
     beast::error_code failed;
     bool late = false;
     {
@@ -216,7 +217,7 @@ void HttpConnections::tell_too_slow(const net::ip::address& address) {
 
 void HttpConnections::drain() {
     draining_ = true;
-    for (auto* line : idle_) line->next_layer().cancel();
+    for (auto* line : idle_) line->cancel();
 }
 
 }  // namespace htvm::live

@@ -54,7 +54,7 @@ using SharedConnection = std::shared_ptr<Connection>;
 
 net::awaitable<bool> accepted(Connection& connection, const Request& request, std::size_t largest_message) {
     auto& socket = connection.socket;
-    beast::get_lowest_layer(socket).expires_never();
+    socket.next_layer().expires_never();
     socket.set_option(websocket::stream_base::timeout{handshake, silence, true});
     socket.read_message_max(largest_message);
     socket.auto_fragment(false);  // a packet is one write, not one for each 4 KB
@@ -84,7 +84,7 @@ net::awaitable<void> read_messages(SharedConnection connection, ReceivePart rece
     socket.control_callback(
         [&socket, receive_nothing, refused = 0](websocket::frame_type kind, beast::string_view) mutable {
             if (kind == websocket::frame_type::close || receive_nothing() || ++refused < patience) return;
-            beast::get_lowest_layer(socket).close();
+            socket.next_layer().cut();
         });
     beast::flat_buffer buffer;
     for (bool wanted = true; wanted;) {
@@ -148,7 +148,7 @@ net::awaitable<void> write_messages(Connection& connection, Next next) {
         if (!co_await write(connection, !text.empty(), bytes)) break;
     }
     // The reader ends with the line.
-    beast::get_lowest_layer(connection.socket).close();
+    connection.socket.next_layer().cut();
 }
 
 // Takes leave of the hub however the coroutine ends: when the server stops, it is destroyed where it waits.
@@ -194,7 +194,7 @@ net::awaitable<void> publish_by_socket(Line line, Request request, std::string n
 }
 
 net::awaitable<void> watch_by_socket(Line line, Request request, std::string name, Hub& hub) {
-    keep_kernel_buffers_small(line);
+    line.keep_kernel_buffers_small();
     const auto connection = std::make_shared<Connection>(std::move(line));
     if (!co_await accepted(*connection, request, most_text_bytes)) co_return;
     const WatchOptions options{.stamps = query_value(request.target(), "stamps").has_value()};
@@ -202,8 +202,7 @@ net::awaitable<void> watch_by_socket(Line line, Request request, std::string nam
     std::optional<Hub::Viewer> watching;
     const auto wake = [&] {
         news.timer.cancel();
-        if (news.writing && watching && hub.ends_at_once(*watching))
-            beast::get_lowest_layer(connection->socket).close();
+        if (news.writing && watching && hub.ends_at_once(*watching)) connection->socket.next_layer().cut();
     };
     const auto viewer = hub.watch(name, wake, options, Hub::Clock::now());
     if (!viewer) {
@@ -234,12 +233,12 @@ net::awaitable<void> refuse_socket(Line line, Request request, CloseCode code, s
 }
 
 net::awaitable<void> watch_by_body(Line& line, ResponseHeader header, std::string name, Hub& hub) {
-    keep_kernel_buffers_small(line);
+    line.keep_kernel_buffers_small();
     News news(line.get_executor());
     std::optional<Hub::Viewer> watching;
     const auto wake = [&] {
         news.timer.cancel();
-        if (news.writing && watching && hub.ends_at_once(*watching)) line.next_layer().close();
+        if (news.writing && watching && hub.ends_at_once(*watching)) line.cut();
     };
     const auto viewer = hub.watch(name, wake, {.texts = false}, Hub::Clock::now());
     if (viewer) watching = *viewer;
@@ -257,7 +256,7 @@ net::awaitable<void> watch_by_body(Line& line, ResponseHeader header, std::strin
         header.content_length(0);
     }
     http::response_serializer<http::empty_body> serializer(header);
-    line.next_layer().expires_after(silence);
+    line.expires_after(silence);
     const auto [begun, header_bytes] = co_await http::async_write_header(line, serializer, awaited);
     if (!viewer || begun) co_return;
     for (;;) {
@@ -265,11 +264,11 @@ net::awaitable<void> watch_by_body(Line& line, ResponseHeader header, std::strin
         if (std::holds_alternative<Closing>(message)) break;
         const auto* packet = std::get_if<SharedPacket>(&message);
         if (!packet) {
-            line.next_layer().expires_never();
+            line.expires_never();
             co_await news.wait();
             continue;
         }
-        line.next_layer().expires_after(silence);
+        line.expires_after(silence);
         const auto& bytes = (*packet)->bytes;
         news.writing = true;
         const auto [error, written] =

@@ -231,6 +231,12 @@ std::string metrics_text(const MetricsSources& sources, Hub::Clock::time_point n
     metrics.gauge("connections", "Open now", std::uint64_t{sources.connections});
     metrics.gauge("ready", "0: the server is ending", std::uint64_t{sources.ready});
     add_refused(metrics, sources);
+    if (const auto* authority = sources.authority)
+        metrics.add("authority_answers_total", "counter", "What the authority was asked, by its answer", "answer",
+                    {{"yes", number_text(authority->yes)},
+                     {"no", number_text(authority->no)},
+                     {"none", number_text(authority->none)},
+                     {"remembered", number_text(authority->remembered)}});
     add_traffic(metrics, sources);
     if (sources.hub) add_hub(metrics, *sources.hub, now);
     add_segments(metrics, sources);

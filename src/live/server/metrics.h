@@ -10,6 +10,7 @@
 
 #include "live/hub/hub.h"
 #include "live/hub/nats_peering.h"
+#include "live/server/authority.h"
 #include "live/server/live_segments.h"
 #include "live/server/recorder.h"
 #include "live/server/traffic.h"
@@ -24,6 +25,7 @@ struct MetricsSources {
     const Recorder* recorder = nullptr;               // null: nothing is recorded
     const LiveSegments* segments = nullptr;           // null: there are none of the live streams
     std::optional<NatsCounters> nats{};               // none: the hub is joined with no others
+    const AuthorityCounters* authority = nullptr;     // null: there is none
     std::map<std::string, std::uint64_t> refused{};   // requests and connections, by cause; besides the hub's own
     const Traffic* traffic = nullptr;                 // null: not counted
     bool ready = true;                                // false: the server is ending

@@ -21,6 +21,7 @@ struct Refusal {
     boost::beast::http::status status = boost::beast::http::status::forbidden;
     CloseCode code = CloseCode::refused;  // instead, of a WebSocket that is opened only to say why
     std::chrono::seconds delay{};         // before it is said
+    bool may_be_asked = false;            // the authority may say otherwise (live/server/authority.h)
 };
 
 class Refusals {

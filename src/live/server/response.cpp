@@ -66,7 +66,7 @@ net::awaitable<bool> send(Line& line, Response& response, bool with_body, std::c
     const auto count = text ? response.content.size() : response.count;
     if (header.result() != http::status::not_modified) header.set(http::field::content_length, std::to_string(count));
     http::response_serializer<http::empty_body> serializer(header);
-    line.next_layer().expires_after(stall_time);
+    line.expires_after(stall_time);
     if (const auto [error, bytes] = co_await http::async_write_header(line, serializer, awaited); error)
         co_return false;
     if (!with_body) co_return true;
@@ -80,7 +80,7 @@ net::awaitable<bool> send(Line& line, Response& response, bool with_body, std::c
             next = {piece.data(), response.file.file.read(response.first + sent, {piece.data(), wanted})};
         }
         if (next.empty()) co_return false;  // the file has become shorter than was promised
-        line.next_layer().expires_after(stall_time);
+        line.expires_after(stall_time);
         const auto [error, bytes] = co_await net::async_write(line, net::buffer(next), awaited);
         if (error) co_return false;
         sent += bytes;

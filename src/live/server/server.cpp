@@ -3,11 +3,13 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
+#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -15,8 +17,11 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <cstring>
+#include <memory>
 #include <optional>
+#include <thread>
 #include <utility>
+#include <vector>
 
 #include "live/client/control.h"
 #include "live/client/line.h"
@@ -140,6 +145,25 @@ private:
 
 }  // namespace
 
+// As Boost.Asio's, but what waits in it can be destroyed before it is.
+struct Context : net::io_context {
+    Context() : net::io_context(1) {}
+    void destroy_what_waits() { shutdown(); }
+};
+
+// A thread that reads, encrypts and writes for connections.
+struct LineThread {
+    Context context;
+    net::executor_work_guard<net::io_context::executor_type> work = net::make_work_guard(context);
+    std::thread thread{};
+    std::size_t lines = 0;  // that were given to it and have not ended; the server's thread counts
+};
+
+ServerOptions with_authority(ServerOptions options) {
+    options.admission.authority = !options.authority.url.empty();
+    return options;
+}
+
 // The lifecycle. What coroutines use comes before the context, which destroys those that have not ended.
 struct Server::State {
     ServerOptions options;
@@ -152,13 +176,15 @@ struct Server::State {
     ViewerReport viewers;
     std::uint16_t port = 0;
     bool draining = false;
-    net::io_context context{1};
+    std::vector<std::unique_ptr<LineThread>> line_threads;
+    Context context;
     tcp::acceptor acceptor{context};
-    std::optional<NatsPeering> nats;  // if the hub is joined with others
+    std::optional<Authority> authority;  // if there is one
+    std::optional<NatsPeering> nats;     // if the hub is joined with others
     SharedTexts texts{site, context.get_executor()};
 
     explicit State(const ServerOptions& given)
-        : options(given),
+        : options(with_authority(given)),
           site{.admission = admission,
                .refusals = refusals,
                .traffic = traffic,
@@ -170,6 +196,18 @@ struct Server::State {
                .segments = options.segments,
                .stall_time = options.stall_time} {
         site.texts = &texts;
+        for (unsigned i = 0; i < options.line_threads; ++i) line_threads.push_back(std::make_unique<LineThread>());
+    }
+    State(const State&) = delete;
+    State& operator=(const State&) = delete;
+    // Lines that wait on one side hold what belongs to the other, so both let go before either ends; and other threads
+    // hand nothing over any more.
+    ~State() {
+        nats.reset();
+        texts.walker.stop();
+        texts.walker.join();
+        context.destroy_what_waits();
+        for (const auto& one : line_threads) one->context.destroy_what_waits();
     }
 
     Result<void> read_access_files();
@@ -178,9 +216,11 @@ struct Server::State {
     }
     bool shares_port() const { return options.share_port || options.listening_socket >= 0; }
     net::awaitable<void> accept();
-    void take(tcp::socket socket);
+    LineThread* calmest_line_thread() const;
+    void take(tcp::socket socket, LineThread* thread);
     void take_waiting();
-    net::awaitable<void> serve(Line line, net::ip::address address, AddressCounts::Place place);
+    net::awaitable<void> serve(Line line, net::ip::address address, AddressCounts::Place place, LineThread* thread);
+    void run();
     net::awaitable<void> tick_hub();
     net::awaitable<void> each_second();
     net::awaitable<void> reload_on_hangup();
@@ -198,9 +238,18 @@ Result<void> Server::State::read_access_files() {
     return {};
 }
 
+// The one that has the fewest lines; null: there are none, and the server's own thread does what they would.
+LineThread* Server::State::calmest_line_thread() const {
+    const auto calmest = std::min_element(line_threads.begin(), line_threads.end(),
+                                          [](const auto& a, const auto& b) { return a->lines < b->lines; });
+    return calmest == line_threads.end() ? nullptr : calmest->get();
+}
+
 net::awaitable<void> Server::State::accept() {
     for (;;) {
-        auto [error, socket] = co_await acceptor.async_accept(awaited);
+        auto* thread = calmest_line_thread();
+        auto [error, socket] = co_await acceptor.async_accept(
+            thread ? net::any_io_executor(thread->context.get_executor()) : context.get_executor(), awaited);
         if (error == net::error::operation_aborted || !acceptor.is_open()) co_return;
         if (error) {
             // Out of file descriptors, most likely: others have to end first.
@@ -208,11 +257,11 @@ net::awaitable<void> Server::State::accept() {
             co_await pause.async_wait(awaited);
             continue;
         }
-        take(std::move(socket));
+        take(std::move(socket), thread);
     }
 }
 
-void Server::State::take(tcp::socket socket) {
+void Server::State::take(tcp::socket socket, LineThread* thread) {
     beast::error_code unknown;
     const auto address = socket.remote_endpoint(unknown).address();
     auto place = unknown ? std::nullopt : admission.admit_connection(address, site.proxies.trusts(address));
@@ -228,8 +277,8 @@ void Server::State::take(tcp::socket socket) {
         return;
     }
     beast::tcp_stream tcp(std::move(socket));
-    Line line = tls ? Line(std::move(tcp), *tls) : Line(std::move(tcp));
-    net::co_spawn(context, serve(std::move(line), address, std::move(*place)), net::detached);
+    Line line(std::move(tcp), tls ? &*tls : nullptr, context.get_executor());
+    net::co_spawn(context, serve(std::move(line), address, std::move(*place), thread), net::detached);
 }
 
 // The kernel would cut off those whom it has let wait for this socket.
@@ -237,16 +286,21 @@ void Server::State::take_waiting() {
     beast::error_code error;
     acceptor.non_blocking(true, error);
     while (!error) {
-        auto socket = acceptor.accept(error);
-        if (!error) take(std::move(socket));
+        auto* thread = calmest_line_thread();
+        auto socket = acceptor.accept(
+            thread ? net::any_io_executor(thread->context.get_executor()) : context.get_executor(), error);
+        if (!error) take(std::move(socket), thread);
     }
 }
 
-net::awaitable<void> Server::State::serve(Line line, net::ip::address address, AddressCounts::Place place) {
+net::awaitable<void> Server::State::serve(Line line, net::ip::address address, AddressCounts::Place place,
+                                          LineThread* thread) {
+    if (thread) ++thread->lines;
     {
         const auto counted = std::move(place);
         co_await connections.serve(std::move(line), address);
     }
+    if (thread) --thread->lines;
     if (draining && admission.connections() == 0) context.stop();
 }
 
@@ -340,6 +394,11 @@ Result<Server> Server::open(const ServerOptions& options) {
         if (!nats) return tl::unexpected(nats.error());
         state->site.nats = &state->nats.emplace(std::move(*nats));
     }
+    if (!options.authority.url.empty()) {
+        auto authority = Authority::open(options.authority);
+        if (!authority) return tl::unexpected(authority.error());
+        state->site.authority = &state->authority.emplace(std::move(*authority));
+    }
     if (options.hub && options.recorder) record(*options.hub, *options.recorder);
     return Server(std::move(state));
 }
@@ -353,17 +412,21 @@ std::string Server::congestion_control() const {
     return {name.data(), ::strnlen(name.data(), name.size())};
 }
 
-void Server::run() {
-    auto& state = *state_;
-    const auto& options = state.options;
-    net::co_spawn(state.context, state.accept(), net::detached);
-    net::co_spawn(state.context, state.each_second(), net::detached);
-    if (options.hub) net::co_spawn(state.context, state.tick_hub(), net::detached);
-    net::co_spawn(state.context, state.drain_on_signal(), net::detached);
-    if (!options.certificate.empty() || !options.admission.publishers.empty() || !options.admission.link_keys.empty() ||
-        options.reload)
-        net::co_spawn(state.context, state.reload_on_hangup(), net::detached);
-    state.context.run();
+void Server::run() { state_->run(); }
+
+void Server::State::run() {
+    net::co_spawn(context, accept(), net::detached);
+    net::co_spawn(context, each_second(), net::detached);
+    if (options.hub) net::co_spawn(context, tick_hub(), net::detached);
+    net::co_spawn(context, drain_on_signal(), net::detached);
+    const auto& who = options.admission;
+    const bool files = !options.certificate.empty() || !who.publishers.empty() || !who.link_keys.empty() ||
+                       !who.web_token_keys.empty() || !who.revoked.empty();
+    if (files || options.reload) net::co_spawn(context, reload_on_hangup(), net::detached);
+    for (const auto& one : line_threads) one->thread = std::thread([&one] { one->context.run(); });
+    context.run();
+    for (const auto& one : line_threads) one->context.stop();
+    for (const auto& one : line_threads) one->thread.join();
 }
 
 void Server::stop() { state_->context.stop(); }

@@ -12,9 +12,11 @@
 //   Refusals         who was refused, counted by cause and told the log                 refusals.h
 //
 // Threads. run() is one thread: every connection, handler and timer runs on it, the hub is called on it, and so is the
-// log; nothing here is locked. What a handler does without waiting holds up all others, so it must be short. Each
-// recording has a thread of its own, which writes to the disk (recorder.h), and so have NATS and its library, which
-// only hand messages over (live/hub/nats_peering.h). stop() may be called on any thread.
+// log; nothing here is locked. What a handler does without waiting holds up all others, so it must be short. With
+// line_threads, what the kernel and TLS do for a connection is spread over these (live/client/line.h): they read,
+// encrypt and write bytes that run() lends them, packets that all viewers share among these, and know nothing else.
+// Each recording has a thread of its own, which writes to the disk (recorder.h), and so have NATS and its library,
+// which only hand messages over (live/hub/nats_peering.h). stop() may be called on any thread.
 #pragma once
 
 #include <chrono>
@@ -28,6 +30,7 @@
 #include "live/hub/hub.h"
 #include "live/hub/nats_peering.h"
 #include "live/server/admission.h"
+#include "live/server/authority.h"
 #include "live/server/served_files.h"
 
 namespace htvm::live {
@@ -42,6 +45,8 @@ struct ServerOptions {
     bool share_port = false;
     // A socket that listens already, as systemd hands over; then address and port are its own. -1: none.
     int listening_socket = -1;
+    // Threads, beside that of run(), over which what connections read, encrypt and write is spread. 0: run() does it.
+    unsigned line_threads = 0;
     // TCP's congestion control, by the kernel's name for it; the kernel's own choice if it has none of this name.
     std::string congestion_control{};
     // PEM files, for TLS; both "": without. They are read again on SIGHUP together with those of AdmissionOptions: all
@@ -57,7 +62,8 @@ struct ServerOptions {
     // Offers the live streams as segments and playlists; null: not. It must outlive the server, and listens to the hub.
     LiveSegments* segments = nullptr;
 
-    AdmissionOptions admission{};
+    AdmissionOptions admission{};  // but for its .authority: that is there if it has an address
+    AuthorityOptions authority{};  // who else says who may publish and watch
     // Addresses and networks whose word is taken for whom a connection or request is from (live/server/
     // trusted_proxies.h): in X-Forwarded-For, and, with proxy_protocol, in a header before everything else.
     std::vector<std::string> trusted_proxies{};
