@@ -165,6 +165,7 @@ test('seeks in an .mp4 and in segments show the same frames as in the bare strea
 test('after a seek in segments only what is needed is fetched: a map, and the segments from there on', options, async () => {
     await page.evaluate(() => window.test.open({ src: '/segments/whole/dancer.m3u8' }));
     const names = (await readdir(join(work, 'whole'))).filter((name) => name.endsWith('.m4s')).sort((a, b) => parseInt(a) - parseInt(b));
+    await new Promise((resolve) => setTimeout(resolve, 500)); // what comes after the beginning is fetched
     server.requests.length = 0;
     await seek(2.9);
     const asked = server.requests.map((request) => request.path.split('/').at(-1)).filter((name) => name.endsWith('.m4s'));
@@ -178,7 +179,8 @@ test('a segment that is gone, and one that is not what it says, are left out wit
     await writeFile(join(folder, names[3]), Buffer.alloc(5000, 7));
     const bare = await play('/as-is/dancer.htvm');
     const shown = await play('/segments/holes/dancer.m3u8');
-    assert.ok(shown.length < bare.length && shown.length > frames / 2, `${shown.length} frames`);
+    const seconds = [...(await readFile(join(folder, 'dancer.m3u8'), 'utf8')).matchAll(/#EXTINF:([\d.]+)/g)].map((found) => Number(found[1]));
+    assert.equal(shown.length, Math.round(30 * (seconds.reduce((sum, one) => sum + one) - seconds[1] - seconds[3])));
     for (const line of shown) assert.ok(bare.includes(line), line);
     assert.equal(shown.at(-1), bare.at(-1));
     assert.match((await page.evaluate(() => window.test.notices)).join('\n'), /A segment of the stream is gone, or cannot be read, and is left out/);
