@@ -76,7 +76,8 @@ std::optional<SampleRange> RangeCutter::push(StreamSample sample) {
     const auto time = sample.mesh().time;
     if (!range_.samples.empty() && sample.mesh().sync) {
         const auto& first = range_.samples.front().mesh();
-        if (time - first.time >= least_us_ || sample.mesh().entry != first.entry) {
+        const bool is_long = on_grid_ ? time / least_us_ > first.time / least_us_ : time - first.time >= least_us_;
+        if (is_long || sample.mesh().entry != first.entry) {
             range_.end_us = time;
             out = std::exchange(range_, {});
         }

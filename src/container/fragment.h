@@ -22,13 +22,17 @@ struct SampleRange {
 class RangeCutter {
 public:
     // A range ends at the first such place that is at least so long behind its beginning.
-    explicit RangeCutter(double seconds) : least_us_(static_cast<std::int64_t>(seconds * 1e6)) {}
+    // on_grid: or at the first one at or behind a multiple of so long, so that streams of the same frames, in which
+    // decoding can start there, are cut alike.
+    explicit RangeCutter(double seconds, bool on_grid = false)
+        : least_us_(static_cast<std::int64_t>(seconds * 1e6)), on_grid_(on_grid) {}
     // Gives out the range before, when the next one begins.
     std::optional<SampleRange> push(StreamSample sample);
     std::optional<SampleRange> finish(std::uint64_t total_us);
 
 private:
     std::int64_t least_us_;
+    bool on_grid_;
     SampleRange range_;
 };
 
@@ -46,7 +50,7 @@ struct StreamSegment {
 
 class StreamSegmenter {
 public:
-    explicit StreamSegmenter(double seconds) : cutter_(seconds) {}
+    explicit StreamSegmenter(double seconds, bool on_grid = false) : cutter_(seconds, on_grid) {}
     // Takes every packet, in order. An index in front goes into the first map.
     Result<std::optional<StreamSegment>> push(Packet packet);
     // The rest: one segment, or two.

@@ -113,6 +113,7 @@ std::vector<NodeMotions> motions_of(const NodeStarts& starts, const DeformableMe
     if (!starts.before_last.empty()) out.push_back(moved_on(deformable, starts.before_last, starts.last));
     if (!starts.gone_on.empty()) out.emplace_back(starts.gone_on.begin(), starts.gone_on.end());
     if (!starts.skeletal.empty()) out.emplace_back(starts.skeletal.begin(), starts.skeletal.end());
+    if (!starts.shared.empty()) out.emplace_back(starts.shared.begin(), starts.shared.end());
     return out;
 }
 
@@ -133,7 +134,12 @@ NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceI
     const auto from = motions_of(starts, deformable);
     NodeRegistration out;
     out.start = nearest_of(from, deformable, surface, options);
-    out.motion = register_deformation(deformable, surface, from[out.start], options, &out.form);
+    auto rounds = options;
+    if (!starts.shared.empty() && out.start + 1 == from.size()) {
+        rounds.coarse_rounds = 0;
+        rounds.middle_reach = options.near_reach;
+    }
+    out.motion = register_deformation(deformable, surface, from[out.start], rounds, &out.form);
     return out;
 }
 

@@ -56,9 +56,10 @@ DeformableMesh make_tracked_deformable(const NodeReference& reference, const Def
                                        std::span<const Colour> colours = {});
 
 // Possible starts of a registration, each one motion per node, or empty. last, before_last: of the two previous frames.
-// gone_on: behind a TP-frame, as the surface moved before it. skeletal: where the skeleton moves each node.
+// gone_on: behind a TP-frame, as the surface moved before it. skeletal: where the skeleton moves each node. shared:
+// as another encoder of the same capture found that the surface moves: nearly right already.
 struct NodeStarts {
-    std::span<const RigidMotion> last, before_last, gone_on, skeletal;
+    std::span<const RigidMotion> last, before_last, gone_on, skeletal, shared;
 };
 struct NodeRegistration {
     std::vector<RigidMotion> motion;  // of each node, reference -> frame

@@ -1,8 +1,10 @@
 #include "codec/encoder/tracked/tracked_work.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "codec/encoder/lattice_motion.h"
+#include "codec/encoder/tracked/shared_tracking.h"
 
 namespace htvm::internal {
 namespace {
@@ -43,11 +45,23 @@ bool may_be_intra(const TrackedWork& work) {
     return frames_since_intra(work) >= work.configuration.options.least_key_interval;
 }
 
-SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame& captured,
-                        std::vector<StageTime>& stages) {
+std::shared_ptr<const SurfaceIndex> surface_of(const Configuration& configuration, const CapturedFrame& captured,
+                                               std::vector<StageTime>& stages) {
+    const auto& lattice = configuration.header.lattice;
+    const SurfaceKey key{captured.timestamp_us,
+                         lattice.origin,
+                         lattice.bits,
+                         configuration.options.tracked.effort,
+                         configuration.tells_presence(),
+                         captured.mesh.positions.size(),
+                         captured.colours.size()};
+    if (configuration.shared)
+        if (auto known = configuration.shared->surface(key)) return known;
     StageClock clock(stages);
-    auto out = captured_surface(captured.mesh, deformation_options(configuration));
-    if (!captured.colours.empty()) out.colours = captured.colours;
+    auto made = captured_surface(captured.mesh, deformation_options(configuration));
+    if (!captured.colours.empty()) made.colours = captured.colours;
+    auto out = std::make_shared<const SurfaceIndex>(std::move(made));
+    if (configuration.shared) configuration.shared->add(key, out);
     clock.done("search structures");
     return out;
 }
@@ -59,6 +73,11 @@ NodeRegistration register_frame(const Configuration& configuration, const Tracke
     StageClock clock(stages);
     const auto skeletal = skeletal_node_motion(configuration, reference.decoded, captured.pose);
     starts.skeletal = skeletal;
+    std::vector<RigidMotion> shared;
+    if (configuration.follows)
+        shared = configuration.shared->start(captured.timestamp_us, configuration.header.lattice, reference.deformable,
+                                             starts.last);
+    starts.shared = shared;
     auto options = deformation_options(configuration, tracking_effort(captured.effort));
     options.in_vain = in_vain;
     options.present = presence;
@@ -77,7 +96,7 @@ const NodeRegistration& register_once(const TrackedWork& work, Tracking& trackin
     if (!tracking.registered) {
         const auto& history = work.sequence.history;
         tracking.registered = register_frame(work.configuration, *work.reference, work.surface, work.captured,
-                                             {history.last, history.before_last, history.gone_on, {}},
+                                             {history.last, history.before_last, history.gone_on, {}, {}},
                                              present(work.sequence), work.stages);
     }
     return *tracking.registered;
@@ -92,7 +111,7 @@ FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered,
     options.present = present(work.sequence);
     out.any =
         follow_lost_limbs(work.reference->deformable, work.surface,
-                          {history.last, history.before_last, history.gone_on, skeletal}, options, out.registered);
+                          {history.last, history.before_last, history.gone_on, skeletal, {}}, options, out.registered);
     clock.done("registration");
     return out;
 }

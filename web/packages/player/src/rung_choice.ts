@@ -26,7 +26,7 @@ const shareToRise = 0.7;
 const decodingTooLong = 0.8;
 const decodingShortEnough = 0.4;
 
-/** Starts low, falls at once where the last segment came too slowly, and rises where the last two came fast. */
+/** Starts low, falls at once where the last segment came too slowly, and rises where the last one and one of the two before came fast. */
 export function chooseRung(state: LineState): RungChoice {
     const { rungs, current, bitsPerSecond, aheadSeconds, segmentSeconds, decodeShare } = state;
     const newest = bitsPerSecond.at(-1);
@@ -38,7 +38,9 @@ export function chooseRung(state: LineState): RungChoice {
         if (below < current) return { rung: below, reason: line };
     }
     if (decodeShare > decodingTooLong && current > 0) return { rung: current - 1, reason: 'decoding takes too long' };
-    const sure = Math.min(newest, bitsPerSecond.at(-2) ?? newest);
+    // One slow segment among fast ones says little of a line, and one fast one nothing.
+    const before = bitsPerSecond.slice(-3, -1);
+    const sure = Math.min(newest, before.length > 0 ? Math.max(...before) : newest);
     const above = highest(rungs, shareToRise * sure);
     if (above <= current) return { rung: current, reason: line };
     if (decodeShare > decodingShortEnough) return { rung: current, reason: `decoding takes ${Math.round(100 * decodeShare)} % of the time` };

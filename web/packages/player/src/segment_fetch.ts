@@ -5,6 +5,7 @@ const retriesMs = [250, 750, 2000];
 const mostBytes = 1 << 26;
 const lookEveryMs = 200;
 const rateOverMs = 600; // what the line brings now is measured over so long
+const leastRest = 8192; // bytes behind the first ones, by which alone the line is measured
 const leastMs = 400; // of a transfer, before it can be given up
 
 /** How a transfer goes: bytes that have come, all that will (null: not told), and bits a second now. */
@@ -15,7 +16,7 @@ export interface Progress {
 }
 
 export type Fetched =
-    | { outcome: 'here'; bytes: Uint8Array; milliseconds: number; url: string }
+    | { outcome: 'here'; bytes: Uint8Array; bitsPerSecond: number; url: string }
     /** The server does not have it. */
     | { outcome: 'gone' }
     | { outcome: 'given up'; bitsPerSecond: number };
@@ -67,10 +68,12 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
         const length = Number(response.headers.get('Content-Length') ?? NaN);
         if (length > 0 && !response.headers.get('Content-Encoding')) total = length;
         const parts: Uint8Array[] = [];
+        let first = { at: performance.now(), bytes: 0 }; // until then much of the time is the way there and back
         const reader = response.body!.getReader();
         for (;;) {
             const { done, value } = await reader.read();
             if (done) break;
+            if (bytes === 0) first = { at: performance.now(), bytes: value.length };
             bytes += value.length;
             if (bytes > mostBytes) {
                 abort.abort();
@@ -84,7 +87,11 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
             whole.set(part, at);
             at += part.length;
         }
-        return { outcome: 'here', bytes: whole, milliseconds: performance.now() - begin, url: response.url || url };
+        const end = performance.now();
+        const ofAll = (8000 * bytes) / Math.max(end - begin, 1);
+        const rest = bytes - first.bytes;
+        const ofRest = rest < leastRest ? 0 : (8000 * rest) / Math.max(end - first.at, 1);
+        return { outcome: 'here', bytes: whole, bitsPerSecond: Math.max(ofAll, ofRest), url: response.url || url };
     } catch (error) {
         if (givenUp > 0) return { outcome: 'given up', bitsPerSecond: givenUp };
         throw error;

@@ -285,7 +285,7 @@ export class SegmentPackets implements StreamPackets {
             this.#atMost = { number: segment.number, rung: rung - 1 };
             return this.#measured(fetched.bitsPerSecond);
         }
-        this.#measured((8000 * fetched.bytes.length) / Math.max(fetched.milliseconds, 1));
+        this.#measured(fetched.bitsPerSecond);
         try {
             if (!map && hasOtherTracks(fetched.bytes, this.#tracks!)) {
                 map = await this.#map(segment, signal);
@@ -364,10 +364,12 @@ function hasOtherTracks(bytes: Uint8Array, { tracks }: Movie): boolean {
 
 function pause(milliseconds: number, signal: AbortSignal): Promise<void> {
     return new Promise((resolve) => {
-        const timer = setTimeout(resolve, milliseconds);
-        signal.addEventListener('abort', () => {
+        const end = (): void => {
             clearTimeout(timer);
+            signal.removeEventListener('abort', end);
             resolve();
-        });
+        };
+        const timer = setTimeout(end, milliseconds);
+        signal.addEventListener('abort', end);
     });
 }
