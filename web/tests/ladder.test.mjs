@@ -39,6 +39,7 @@ for (const [what, more, rung, reason] of [
     ['the line bears more, twice in a row: it rises', { bitsPerSecond: [4 * mega, 4 * mega] }, 2, /4\.0 Mbit\/s/],
     ['the line bore more only once: it stays', { bitsPerSecond: [1 * mega, 4 * mega] }, 1, /4\.0 Mbit\/s/],
     ['the line bears more, but for one segment: it rises', { bitsPerSecond: [4 * mega, 1 * mega, 4 * mega] }, 2, /4\.0 Mbit\/s/],
+    ['the line bears far more than the next rung, if only once: it rises by one', { current: 0, bitsPerSecond: [0.4 * mega, 4 * mega] }, 1, /4\.0 Mbit\/s/],
     ['from the lowest it may rise by two', { current: 0, bitsPerSecond: [4 * mega, 4 * mega] }, 2, /4\.0 Mbit\/s/],
     ['the last segment came too slowly: it falls at once', { current: 2, bitsPerSecond: [4 * mega, 0.4 * mega] }, 0, /0\.4 Mbit\/s/],
     ['the line bears not even the lowest: the lowest', { current: 2, bitsPerSecond: [0.1 * mega] }, 0, /0\.1 Mbit\/s/],

@@ -23,10 +23,12 @@ export interface RungChoice {
 
 const shareToStay = 0.9; // of what the line brings
 const shareToRise = 0.7;
+const plenty = 2.5; // times the next rung's rate, of which one segment is enough to rise by one
 const decodingTooLong = 0.8;
 const decodingShortEnough = 0.4;
 
-/** Starts low, falls at once where the last segment came too slowly, and rises where the last one and one of the two before came fast. */
+/** Starts low, falls at once where the last segment came too slowly, and rises where the last one and one of the two before came fast,
+ * or the last one very fast. */
 export function chooseRung(state: LineState): RungChoice {
     const { rungs, current, bitsPerSecond, aheadSeconds, segmentSeconds, decodeShare } = state;
     const newest = bitsPerSecond.at(-1);
@@ -41,7 +43,8 @@ export function chooseRung(state: LineState): RungChoice {
     // One slow segment among fast ones says little of a line, and one fast one nothing.
     const before = bitsPerSecond.slice(-3, -1);
     const sure = Math.min(newest, before.length > 0 ? Math.max(...before) : newest);
-    const above = highest(rungs, shareToRise * sure);
+    const next = current + 1 < rungs.length && newest >= plenty * rungs[current + 1]! ? current + 1 : current;
+    const above = Math.max(highest(rungs, shareToRise * sure), next);
     if (above <= current) return { rung: current, reason: line };
     if (decodeShare > decodingShortEnough) return { rung: current, reason: `decoding takes ${Math.round(100 * decodeShare)} % of the time` };
     if (aheadSeconds < segmentSeconds / 2) return { rung: current, reason: 'too little is ahead to rise' };
