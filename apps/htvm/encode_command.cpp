@@ -8,6 +8,7 @@
 #include "command_line/headings.h"
 #include "commands.h"
 #include "encode.h"
+#include "encode_ladder.h"
 #include "io/number_text.h"
 
 namespace htvm::app {
@@ -20,6 +21,21 @@ void add_output(CLI::App& command, EncodeRequest& request) {
                     "ws://HOST:PORT/publish/NAME, or wss:// with TLS")
         ->type_name("FILE")
         ->required()
+        ->group(heading::output);
+    command
+        .add_option("--segment", request.segment_seconds,
+                    "Of a playlist, -o NAME.m3u8: seconds that a segment lasts at least; it ends where players can\n"
+                    "start (default 2)")
+        ->check(CLI::Range(0.1, 60.0))
+        ->type_name("SECONDS")
+        ->group(heading::output);
+    command
+        .add_option("--ladder", request.ladder,
+                    "Several qualities at once, from which players choose by their line, as segments that are cut at\n"
+                    "the same frames in all: -o NAME.m3u8 becomes the list of their playlists, NAME-1.m3u8 and so on,\n"
+                    "the coarsest first. Rates in Mbit/s, 0.3,0.8,2, or qualities, q35,q50,q65, or web (q30,q42,q60).\n"
+                    "The capture is read once, and the finest rung's tracking serves the others")
+        ->type_name("RUNGS")
         ->group(heading::output);
 }
 
@@ -149,6 +165,9 @@ void add_conditions(CLI::App& command) {
         for (const char* by_hand : {"--quality", "--preset", "--geometry-step", "--colour-step"})
             option(control)->excludes(option(by_hand));
     option("--preset")->excludes(option("--quality"));
+    for (const char* of_one :
+         {"--quality", "--preset", "--bitrate", "--target-error", "--geometry-step", "--colour-step"})
+        option("--ladder")->excludes(option(of_one));
     option("--job")->excludes(option("--jobs"));
     for (const char* chosen : {"--deadline", "--effort"}) option("--repeat-efforts")->excludes(option(chosen));
 }
@@ -216,6 +235,7 @@ void add_encode(CLI::App& app, Run& run) {
     command->callback([request, &run] {
         if (const auto why = contradiction_in(*request); !why.empty()) throw CLI::ValidationError(why);
         run = [request]() -> Result<void> {
+            if (!request->ladder.empty()) return encode_ladder(*request);
             const auto plan = plan_of(*request);
             return plan ? encode(*plan) : tl::unexpected(plan.error());
         };

@@ -179,6 +179,8 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     }
     if (auto set = set_repair(pass, repair); !set) return tl::unexpected(set.error());
     const bool key_frame = pass.wants_key_frame && pass.wants_key_frame();
+    const bool access = pass.wants_access && pass.wants_access(timestamp_us);
+    if (access) pass.encoder.request_access();
     const auto pushed = pass.encoder.push(mesh, pose, timestamp_us, key_frame);
     if (limited)
         if (auto set = set_repair(pass, {}); !set) return tl::unexpected(set.error());
@@ -192,6 +194,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         timed.took = milliseconds_since(start);
         if (auto ok = count(pass, timed); !ok) return tl::unexpected(ok.error());
         drop(pass, pass.capture.name(), pushed.error());
+        if (access) pass.encoder.request_access();  // for the next one
         pass.step("dropped");
         return Coded::dropped;
     }
@@ -277,18 +280,18 @@ Result<void> check_triangles(Pass& pass, const Mesh& mesh) {
     return {};
 }
 
-void keep_last(Pass& pass, Mesh mesh) {
+void keep_last(Pass& pass, const Mesh& mesh) {
     if (!pass.plan.fill && pass.plan.bad_frames != BadFrames::repeat) return;
-    pass.last = std::move(mesh);
+    pass.last = mesh;
     if (const auto* pose = pass.capture.pose()) pass.last_pose = *pose;
     if (pass.pictures) pass.last_textured = pass.capture.textured();
 }
 
-Result<void> take(Pass& pass, Mesh& mesh) {
+Result<void> take(Pass& pass, const Mesh& mesh) {
     if (auto fine = check_triangles(pass, mesh); !fine) return fine;
     const auto coded = code(pass, mesh, pass.capture.pose(), pass.capture.timestamp_us(), pass.capture.textured());
     if (!coded) return tl::unexpected(coded.error());
-    if (*coded == Coded::yes) keep_last(pass, std::move(mesh));
+    if (*coded == Coded::yes) keep_last(pass, mesh);
     return {};
 }
 
@@ -347,17 +350,25 @@ Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const 
 }
 
 Result<void> encode_frames(Pass& pass) {
+    Pass* const alone = &pass;
+    return encode_frames(std::span(&alone, 1));
+}
+
+Result<void> encode_frames(std::span<Pass* const> passes) {
     const auto stopped = [] { return fail(ErrorKind::bad_input, "interrupted"); };
+    auto& first = *passes.front();
     for (;;) {
-        if (pass.is_stopped()) return stopped();
-        auto mesh = pass.capture.next();
+        if (first.is_stopped()) return stopped();
+        const auto mesh = first.capture.next();
         if (mesh && !*mesh) break;
-        if (auto filled = take_gap(pass); !filled) return filled;
-        const auto taken = mesh ? take(pass, **mesh) : tl::unexpected(mesh.error());
-        if (taken) continue;
-        if (auto survived = take_bad(pass, taken.error()); !survived) return survived;
+        for (auto* pass : passes) {
+            if (auto filled = take_gap(*pass); !filled) return filled;
+            const auto taken = mesh ? take(*pass, **mesh) : tl::unexpected(mesh.error());
+            if (taken) continue;
+            if (auto survived = take_bad(*pass, taken.error()); !survived) return survived;
+        }
     }
-    return pass.is_stopped() ? stopped() : Result<void>();
+    return first.is_stopped() ? stopped() : Result<void>();
 }
 
 Result<void> finish(Pass& pass) {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -64,7 +65,9 @@ struct Pass {
     FrameWarnings* warnings;                       // null: what is wrong with the capture was said before
     Summary& summary;
     RateReport& rate;
-    std::function<bool()> wants_key_frame = {};           // asked before each frame: whether it should be an I-frame
+    std::function<bool()> wants_key_frame = {};  // asked before each frame: whether it should be an I-frame
+    // Asked before each frame: whether decoding should be able to start there.
+    std::function<bool(std::int64_t timestamp_us)> wants_access = {};
     std::function<std::optional<double>()> bitrate = {};  // asked after each frame: bits per second, where it changes
     std::function<double()> held_back = [] { return 0.0; };  // milliseconds so far that packets waited until due
     Deadline* deadline = nullptr;  // how much is searched for each frame, and how long that takes; null: not counted
@@ -88,6 +91,8 @@ Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const 
 
 // Ends with an error of any kind where it is stopped.
 Result<void> encode_frames(Pass& pass);
+// Several passes over the same capture, which is read once: each frame goes into the first one first.
+Result<void> encode_frames(std::span<Pass* const> passes);
 // The end of the stream, also of one that ended early.
 Result<void> finish(Pass& pass);
 

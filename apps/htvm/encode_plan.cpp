@@ -334,6 +334,7 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     plan.chunks = request.chunks == 0 ? internal::thread_count(0) : request.chunks;
     plan.jobs = request.jobs;
     plan.job = request.job;
+    plan.segment_seconds = request.segment_seconds;
     return plan;
 }
 

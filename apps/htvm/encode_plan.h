@@ -58,6 +58,10 @@ struct EncodeRequest {
     std::size_t chunks = 1;    // that the capture is cut into; 0: one per core
     std::size_t jobs = 0;      // groups, from one I-frame to the next, at a time; 0: not in such groups
     Job job;
+    // Several qualities of the same capture, side by side (encode_ladder.h): web, or rates or qualities with commas
+    // between; empty: one.
+    std::string ladder;
+    double segment_seconds = 2;  // where the output is a playlist: that a segment lasts at least
 };
 
 // Why the request cannot be carried out, whatever the capture is: a sentence that begins with the option. Empty if
@@ -103,6 +107,7 @@ struct EncodePlan {
     std::size_t chunks = 1;    // of equal length
     std::size_t jobs = 0;      // groups at a time
     Job job;
+    double segment_seconds = 2;  // where the output is a playlist
     // Whether the capture is encoded in groups of frames that do not know of each other.
     bool in_groups() const { return chunks != 1 || jobs > 0 || job.of > 0; }
 };

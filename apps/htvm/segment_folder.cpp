@@ -22,7 +22,7 @@ bool is_playlist_name(const std::string& path) {
 }
 
 SegmentFolder::SegmentFolder(fs::path playlist, const SegmentOptions& options)
-    : path_(std::move(playlist)), options_(options), segmenter_(options.seconds) {
+    : path_(std::move(playlist)), options_(options), segmenter_({.seconds = options.seconds, .on_grid = options.on_grid}) {
     list_.target_seconds = options.seconds;
     list_.has_end = false;
     list_.kind = !options.is_live             ? PlaylistKind::whole
@@ -166,12 +166,29 @@ Result<void> add_piece(Pieces& pieces, const fs::path& playlist, const std::stri
     return {};
 }
 
+// So that no list leads to itself.
+bool is_list_of_playlists(const fs::path& path) {
+    const auto bytes = read_file(path.string());
+    return bytes && !read_variants({reinterpret_cast<const char*>(bytes->data()), bytes->size()}).empty();
+}
+
 }  // namespace
 
 Result<FileBytes> source_of_playlist(const std::string& path) {
     const auto bytes = read_file(path);
     if (!bytes) return tl::unexpected(bytes.error());
-    const auto list = read_playlist({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+    const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    // Of several qualities the finest.
+    if (const auto variants = read_variants(text); !variants.empty()) {
+        const auto& finest = *std::max_element(variants.begin(), variants.end(), [](const auto& a, const auto& b) {
+            return a.bits_per_second < b.bits_per_second;
+        });
+        if (!is_name_below(finest.uri) || is_list_of_playlists(fs::path(path).parent_path() / finest.uri))
+            return fail(ErrorKind::bad_input,
+                        fmt::format("{} names {}, which is not a playlist beside it", path, finest.uri));
+        return source_of_playlist((fs::path(path).parent_path() / finest.uri).string());
+    }
+    const auto list = read_playlist(text);
     if (!list) return fail(list.error().kind, path + ": " + list.error().message);
     auto pieces = std::make_shared<Pieces>();
     std::string map;

@@ -20,6 +20,7 @@ bool is_playlist_name(const std::string& path);
 
 struct SegmentOptions {
     double seconds = 2;         // that a segment lasts at least: it ends where players can start
+    bool on_grid = false;       // or at the first such place behind a multiple of that: in all rungs of a ladder alike
     bool is_live = false;       // the playlist is written anew with every segment
     double window_seconds = 0;  // of a live stream, that are kept; 0: all
 };

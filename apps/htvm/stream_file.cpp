@@ -370,7 +370,7 @@ Result<void> StreamOutput::finish_segments(const StreamIndex& index) {
     if (auto flushed = file_->flush(); !flushed) return flushed;
     auto source = packets_in(file_->written_at());
     if (!source) return tl::unexpected(source.error());
-    SegmentFolder folder(playlist_, {});
+    SegmentFolder folder(playlist_, segment_options_);
     if (auto written = folder.write(write_index(index)); !written) return written;
     while (auto packet = (*source)())
         if (auto written = folder.write(std::move(*packet)); !written) return written;

@@ -21,6 +21,7 @@
 #include "io/output_file.h"
 #include "pacing.h"
 #include "publishing.h"
+#include "segment_folder.h"
 
 namespace CLI {
 class App;
@@ -94,6 +95,8 @@ public:
     Publishing* publishing() { return publishing_ ? &*publishing_ : nullptr; }
     // How an .mp4 is written, if it is one.
     void set(const Mp4Options& options) { mp4_options_ = options; }
+    // How segments are cut, if it becomes some.
+    void set(const SegmentOptions& options) { segment_options_ = options; }
     // Lays sound between the frames of the stream, in the place of its own. Before anything is written.
     void lay(AudioTrack audio) { audio_.emplace(std::move(audio)); }
     Result<void> write(const Packet& packet);
@@ -124,6 +127,7 @@ private:
     std::string playlist_;           // of the segments that file_ becomes; empty: it becomes none
     std::optional<OutputFile> mp4_;  // where file_ becomes one
     Mp4Options mp4_options_;
+    SegmentOptions segment_options_;
     std::optional<OutputFile> file_;  // none: standard output, or a hub
     std::optional<Publishing> publishing_;
     std::optional<Pacing> pacing_;

@@ -53,7 +53,7 @@ std::vector<Packet> any_packets(fuzz::FuzzInput& input) {
 
 // Maps, each before the parts of its segment: one after another, as a playlist has them.
 Bytes parts_of(const std::vector<Packet>& packets, double seconds, double part_seconds) {
-    StreamSegmenter segmenter(seconds, part_seconds);
+    StreamSegmenter segmenter({.seconds = seconds, .part_seconds = part_seconds});
     Bytes out;
     const auto take = [&out](const StreamSegment& part) {
         out.insert(out.end(), part.map.begin(), part.map.end());

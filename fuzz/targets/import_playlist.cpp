@@ -7,6 +7,9 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
     using fuzz::require;
+    for (const auto& variant : read_variants({reinterpret_cast<const char*>(data), size}))
+        require(!variant.uri.empty() && variant.uri.size() <= 2048,
+                "a quality has a name, and no longer one than is taken");
     const auto list = read_playlist({reinterpret_cast<const char*>(data), size});
     if (!list) return 0;
     const auto again = read_playlist(write_playlist(*list));

@@ -82,6 +82,14 @@ public:
     // mm in a region of 10 cm of an adult, it is not called, and the frame is repaired. Null: all are repaired. The
     // same answers give the same bytes. bad_input with another profile than tracked.
     Result<void> set_repair(std::function<bool()> may_repair);
+    // The next frame pushed becomes one where decoding can start, for whoever has what it refers to, whatever
+    // TrackedOptions::access_interval says. Segments of several encoders that begin with the same frames begin so.
+    void request_access();
+    // Before the first push: what `first` finds of a frame that both are pushed, `first` before this one, this one goes
+    // by, which saves it time: search structures, and where the surface moved. For the same capture in several
+    // qualities; the stream may differ a little from what it is otherwise. They are used by one thread at a time
+    // together. bad_input if either has begun, or has another profile than tracked, or `first` goes by a third one.
+    Result<void> share_with(Encoder& first);
     // Ends the sequence: codes what is held, and queues the index of I-frames. After an error nothing has ended.
     Result<void> finish();
     // The next packet in stream order; nothing if more must be pushed first.

@@ -84,7 +84,7 @@ std::optional<SampleRange> RangeCutter::push(StreamSample sample) {
     const auto& mesh = sample.mesh();
     if (!range_.samples.empty()) {
         const auto last = range_.samples.back().mesh().time, first = range_.samples.front().mesh().time;
-        if (mesh.sync && (mesh.time - begin_us_ >= least_us_ || mesh.entry != entry_))
+        if (mesh.sync && (is_long(mesh.time) || mesh.entry != entry_))
             out = cut(mesh.time, true);
         else if (part_us_ > 0 && mesh.time + (mesh.time - last) - first > part_us_)
             out = cut(mesh.time, false);

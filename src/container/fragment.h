@@ -20,14 +20,22 @@ struct SampleRange {
     bool ends = true;         // false: the next one goes on with it
 };
 
+// Where a stream is cut.
+struct SegmentCuts {
+    double seconds = 2;       // a range ends at the first place where decoding can start that is so long behind its
+                              // beginning; > 0
+    double part_seconds = 0;  // it comes in parts that last no longer, unless a single frame does; 0: whole
+    bool on_grid = false;     // it ends at the first such place at or behind a multiple of `seconds`, so that streams of
+                              // the same frames, in which decoding can start there, are cut alike
+};
+
 // Cuts a stream where decoding can start.
 class RangeCutter {
 public:
-    // A range ends at the first such place that is at least so long behind its beginning. part_seconds: it comes in
-    // parts that last no longer, unless a single frame does; 0: whole.
-    explicit RangeCutter(double seconds, double part_seconds = 0)
-        : least_us_(static_cast<std::int64_t>(seconds * 1e6)),
-          part_us_(static_cast<std::int64_t>(part_seconds * 1e6)) {}
+    explicit RangeCutter(const SegmentCuts& cuts)
+        : least_us_(static_cast<std::int64_t>(cuts.seconds * 1e6)),
+          part_us_(static_cast<std::int64_t>(cuts.part_seconds * 1e6)),
+          on_grid_(cuts.on_grid) {}
     // Gives out the range before, when the next one begins.
     std::optional<SampleRange> push(StreamSample sample);
     std::optional<SampleRange> finish(std::uint64_t total_us);
@@ -36,7 +44,11 @@ public:
 
 private:
     std::optional<SampleRange> cut(std::int64_t end_us, bool next_begins);
+    bool is_long(std::int64_t time) const {
+        return on_grid_ ? time / least_us_ > begin_us_ / least_us_ : time - begin_us_ >= least_us_;
+    }
     std::int64_t least_us_, part_us_;
+    bool on_grid_;
     std::int64_t begin_us_ = 0;  // of the whole range
     std::uint16_t entry_ = 0;    // likewise
     SampleRange range_;
@@ -59,11 +71,9 @@ struct StreamSegment {
 
 class StreamSegmenter {
 public:
-    // part_seconds: segments come in parts that last no longer, of which one after another is the segment; 0: whole.
-    // What a part's tables cannot say, as its map was written before, such as a picture of another size, is in whole
-    // packets until the next segment.
-    explicit StreamSegmenter(double seconds, double part_seconds = 0)
-        : cutter_(seconds, part_seconds), in_parts_(part_seconds > 0) {}
+    // With parts, one after another is the segment. What a part's tables cannot say, as its map was written before, such
+    // as a picture of another size, is in whole packets until the next segment.
+    explicit StreamSegmenter(const SegmentCuts& cuts) : cutter_(cuts), in_parts_(cuts.part_seconds > 0) {}
     // Takes every packet, in order. An index in front goes into the first map.
     Result<std::optional<StreamSegment>> push(Packet packet);
     // The rest: one segment, or two.

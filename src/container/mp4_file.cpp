@@ -128,7 +128,7 @@ Result<void> write_fragmented(const std::function<Result<PacketSource>()>& open,
     movie.fragmented = true;
     movie.tables = {};
     if (auto written = sink(write_movie(movie)); !written) return written;
-    RangeCutter cutter(seconds);
+    RangeCutter cutter({.seconds = seconds});
     std::uint32_t sequence = 0;
     const auto write = [&](const std::optional<SampleRange>& range) -> Result<void> {
         if (!range) return {};

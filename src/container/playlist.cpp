@@ -7,6 +7,8 @@
 #include <ctime>
 #include <optional>
 
+#include "container/box.h"
+
 namespace htvm {
 namespace {
 
@@ -189,6 +191,99 @@ Result<Playlist> read_playlist(std::string_view text) {
         reading.seconds.reset();
     }
     return std::move(reading.out);
+}
+
+std::string write_variants(const std::vector<PlaylistVariant>& variants) {
+    std::string out = "#EXTM3U\n#EXT-X-VERSION:7\n#EXT-X-INDEPENDENT-SEGMENTS\n";
+    for (const auto& variant : variants) {
+        out += "#EXT-X-STREAM-INF:BANDWIDTH=" + std::to_string(variant.bits_per_second) +
+               ",AVERAGE-BANDWIDTH=" + std::to_string(variant.average);
+        if (variant.width > 0)
+            out += ",RESOLUTION=" + std::to_string(variant.width) + "x" + std::to_string(variant.height);
+        if (!variant.codecs.empty()) out += ",CODECS=\"" + variant.codecs + "\"";
+        if (variant.frames_per_second > 0) {
+            std::array<char, 32> rate{};
+            std::snprintf(rate.data(), rate.size(), "%.3f", variant.frames_per_second);
+            out += ",FRAME-RATE=" + std::string(rate.data());
+        }
+        out += "\n" + variant.uri + "\n";
+    }
+    return out;
+}
+
+std::vector<PlaylistVariant> read_variants(std::string_view text) {
+    constexpr std::size_t most_variants = 64;
+    std::vector<PlaylistVariant> out;
+    std::optional<PlaylistVariant> told;
+    while (!text.empty() && out.size() < most_variants) {
+        auto line = text.substr(0, text.find('\n'));
+        text.remove_prefix(std::min(text.size(), line.size() + 1));
+        while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
+        if (takes(line, "#EXT-X-STREAM-INF:")) {
+            told.emplace();
+            constexpr std::string_view name = "BANDWIDTH=";
+            for (auto at = line.find(name); at != std::string_view::npos; at = line.find(name, at + 1)) {
+                const auto value = number_at(line.substr(at + name.size()), false);
+                if (!value || *value > 1e15) continue;
+                const bool average = at > 0 && line[at - 1] == '-';
+                (average ? told->average : told->bits_per_second) = static_cast<std::uint64_t>(*value);
+            }
+            told->codecs = quoted(line, "CODECS").value_or("");
+        } else if (!line.empty() && line[0] != '#' && told) {
+            told->uri = line.substr(0, most_uri);
+            out.push_back(std::move(*told));
+            told.reset();
+        }
+    }
+    return out;
+}
+
+namespace {
+
+std::string two_digits(unsigned value) {
+    return {static_cast<char>('0' + value / 10), static_cast<char>('0' + value % 10)};
+}
+
+// As "av01.0.08M.08" or "vp09.00.31.08", by the record of its configuration.
+std::string codec_of(const MediaBox& entry) {
+    if (entry.type == four("Opus")) return "opus";
+    if (entry.type == four("htvm")) return "htvm";
+    constexpr std::size_t visual_fields = 78;
+    if (entry.inside.size() < visual_fields) return {};
+    const auto inside = entry.inside.subspan(visual_fields);
+    if (const auto record = find_box(inside, four("av1C")); record && record->inside.size() >= 4) {
+        const auto profile = record->inside[1] >> 5, level = record->inside[1] & 31;
+        const bool high_tier = (record->inside[2] & 0x80) != 0, high_depth = (record->inside[2] & 0x40) != 0;
+        const bool twelve = (record->inside[2] & 0x20) != 0;
+        return "av01." + std::to_string(profile) + "." + two_digits(static_cast<unsigned>(level)) +
+               (high_tier ? "H." : "M.") + (high_depth ? twelve ? "12" : "10" : "08");
+    }
+    if (const auto record = find_box(inside, four("vpcC")); record && record->inside.size() >= 7)
+        return "vp09." + two_digits(record->inside[4] % 100) + "." + two_digits(record->inside[5] % 100) + "." +
+               two_digits(record->inside[6] >> 4);
+    return {};
+}
+
+}  // namespace
+
+std::string codecs_of(std::span<const std::uint8_t> map) {
+    const auto movie = find_box(map, four("moov"));
+    if (!movie) return {};
+    std::string out;
+    BoxReader in(movie->inside);
+    while (const auto track = in.next()) {
+        if (track->type != four("trak")) continue;
+        std::optional<MediaBox> box = track;
+        for (const auto type : {four("mdia"), four("minf"), four("stbl"), four("stsd")})
+            if (box) box = find_box(box->inside, type);
+        constexpr std::size_t count_fields = 8;
+        if (!box || box->inside.size() < count_fields) continue;
+        BoxReader entries(box->inside.subspan(count_fields));
+        const auto entry = entries.next();
+        const auto codec = entry ? codec_of(*entry) : std::string();
+        if (!codec.empty()) out += (out.empty() ? "" : ",") + codec;
+    }
+    return out;
 }
 
 bool is_name_below(std::string_view uri) {

@@ -53,6 +53,23 @@ std::string write_playlist(const Playlist& playlist);
 // what is not done here: encryption, parts of files, or a list of playlists.
 Result<Playlist> read_playlist(std::string_view text);
 
+// One of several qualities of the same stream, in a list of playlists (a "master playlist").
+struct PlaylistVariant {
+    std::string uri;
+    std::uint64_t bits_per_second = 0;    // of the segment that takes most
+    std::uint64_t average = 0;            // of all
+    std::uint32_t width = 0, height = 0;  // of its pictures; 0: there are none
+    std::string codecs;                   // of its tracks, with commas between
+    double frames_per_second = 0;         // 0: not told
+};
+std::string write_variants(const std::vector<PlaylistVariant>& variants);
+// Those that a text lists, with what is told of them; none where it is no list of playlists.
+std::vector<PlaylistVariant> read_variants(std::string_view text);
+
+// The codecs of the tracks that a map has (the boxes ftyp and moov), as a list of playlists names them; empty if it has
+// none.
+std::string codecs_of(std::span<const std::uint8_t> map);
+
 // Whether an URI of a playlist names a file beside it, or in a folder below: nothing else of a file system is to be
 // read because a playlist says so.
 bool is_name_below(std::string_view uri);

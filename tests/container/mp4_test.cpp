@@ -255,7 +255,7 @@ TEST(Mp4, whose_samples_lie_over_each_other_is_refused) {
 // ---- Segments -------------------------------------------------------------------------------------------------------
 
 std::vector<StreamSegment> segments_of(const std::vector<Packet>& packets, double seconds) {
-    StreamSegmenter segmenter(seconds);
+    StreamSegmenter segmenter({.seconds = seconds});
     std::vector<StreamSegment> out;
     for (const auto& packet : packets) {
         auto segment = segmenter.push(packet);

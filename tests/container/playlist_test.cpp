@@ -84,6 +84,29 @@ TEST(Playlist, that_is_none_is_refused_with_words) {
     }
 }
 
+TEST(A_list_of_playlists, tells_of_each_quality_what_a_player_chooses_by) {
+    const std::vector<PlaylistVariant> variants = {{"low.m3u8", 400000, 300000, 512, 512, "htvm,av01.0.04M.08", 30},
+                                                   {"high.m3u8", 2500000, 2000000, 0, 0, "htvm", 0}};
+    const auto text = write_variants(variants);
+    EXPECT_EQ(text,
+              "#EXTM3U\n"
+              "#EXT-X-VERSION:7\n"
+              "#EXT-X-INDEPENDENT-SEGMENTS\n"
+              "#EXT-X-STREAM-INF:BANDWIDTH=400000,AVERAGE-BANDWIDTH=300000,RESOLUTION=512x512,"
+              "CODECS=\"htvm,av01.0.04M.08\",FRAME-RATE=30.000\n"
+              "low.m3u8\n"
+              "#EXT-X-STREAM-INF:BANDWIDTH=2500000,AVERAGE-BANDWIDTH=2000000,CODECS=\"htvm\"\n"
+              "high.m3u8\n");
+    const auto back = read_variants(text);
+    ASSERT_EQ(back.size(), 2u);
+    EXPECT_EQ(back[0].uri, "low.m3u8");
+    EXPECT_EQ(back[0].bits_per_second, 400000u);
+    EXPECT_EQ(back[0].average, 300000u);
+    EXPECT_EQ(back[0].codecs, "htvm,av01.0.04M.08");
+    EXPECT_EQ(back[1].bits_per_second, 2500000u);
+    EXPECT_TRUE(read_variants(write_playlist(three_segments())).empty());
+}
+
 TEST(Playlist, names_only_files_beside_it) {
     for (const char* name : {"a.m4s", "low/a.m4s", "..a"}) EXPECT_TRUE(is_name_below(name)) << name;
     for (const char* name :

@@ -10,7 +10,7 @@ namespace htvm::test {
 namespace {
 
 std::vector<StreamSegment> parts_of(const std::vector<Packet>& packets, double seconds, double part_seconds) {
-    StreamSegmenter segmenter(seconds, part_seconds);
+    StreamSegmenter segmenter({.seconds = seconds, .part_seconds = part_seconds});
     std::vector<StreamSegment> out;
     for (const auto& packet : packets) {
         auto part = segmenter.push(packet);

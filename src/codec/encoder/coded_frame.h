@@ -27,6 +27,7 @@ struct CapturedFrame {
     CodedPose pose;
     std::int64_t timestamp_us = 0;
     bool force_intra = false;
+    bool force_access = false;              // Encoder::request_access()
     int effort = TrackedOptions{}.effort;   // Encoder::set_effort()
     std::function<bool()> may_repair = {};  // Encoder::set_repair()
 };

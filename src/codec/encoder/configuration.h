@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
 #include "codec/encoder/pose_tracker.h"
 #include "codec/format/sequence.h"
@@ -18,12 +19,16 @@ struct FrameSteps {
     bool operator==(const FrameSteps&) const = default;
 };
 
+class SharedTracking;  // tracked/shared_tracking.h
+
 struct Configuration {
     EncoderOptions options;
     SequenceHeader header;
     Threads threads = {};
     Scale scale;
-    FrameSteps steps;  // of the options, where neither a rate nor an error decides
+    std::shared_ptr<SharedTracking> shared = {};  // with encoders of the same capture; null: this one is alone
+    bool follows = false;                         // goes by what another one finds
+    FrameSteps steps;                             // of the options, where neither a rate nor an error decides
     bool tells_presence() const { return header.version >= presence_version; }  // surface comes and goes
     bool intra_only() const { return options.key_interval == 1; }               // no frame refers to another
 };

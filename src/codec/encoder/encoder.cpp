@@ -17,6 +17,7 @@
 #include "codec/encoder/control/quality_control.h"
 #include "codec/encoder/options_check.h"
 #include "codec/encoder/pose_tracker.h"
+#include "codec/encoder/tracked/shared_tracking.h"
 #include "codec/encoder/tracked/tracked_strategy.h"
 #include "codec/format/frame_kinds.h"
 #include "codec/format/sequence.h"
@@ -57,6 +58,7 @@ struct Encoder::State {
     QualityControl control;
     int effort = usual_effort;         // for the next frame
     std::function<bool()> may_repair;  // Encoder::set_repair()
+    bool access = false;               // Encoder::request_access()
     Output output;
     std::optional<std::int64_t> last_timestamp;
     Queued queued;            // by the last call that queued any
@@ -126,6 +128,7 @@ Result<CapturedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose*
     out.pose = std::move(*coded_pose);
     out.effort = state.effort;
     out.may_repair = state.may_repair;
+    out.force_access = std::exchange(state.access, false);
     return out;
 }
 
@@ -381,6 +384,24 @@ Result<void> Encoder::set_repair(std::function<bool()> may_repair) {
     if (state_->configuration.options.profile != Profile::tracked)
         return fail(ErrorKind::bad_input, "tracking is of the tracked profile: others lose none");
     state_->may_repair = std::move(may_repair);
+    return {};
+}
+
+void Encoder::request_access() { state_->access = true; }
+
+Result<void> Encoder::share_with(Encoder& first) {
+    for (const auto* one : {state_.get(), first.state_.get()}) {
+        if (one->begun || waiting_frames(*one) > 0)
+            return fail(ErrorKind::bad_input, "encoders share what they find from the first frame on");
+        if (one->configuration.options.profile != Profile::tracked)
+            return fail(ErrorKind::bad_input, "only encoders of the tracked profile share what they find");
+    }
+    if (this == &first || first.state_->configuration.follows)
+        return fail(ErrorKind::bad_input, "the encoder that others go by goes by none");
+    auto& shared = first.state_->configuration.shared;
+    if (!shared) shared = std::make_shared<SharedTracking>();
+    state_->configuration.shared = shared;
+    state_->configuration.follows = true;
     return {};
 }
 

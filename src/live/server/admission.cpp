@@ -186,7 +186,16 @@ std::optional<Refusal> Admission::refuse_publishing(const Request& request, cons
 std::optional<Refusal> Admission::refuse_watching(const Request& request, const std::string& stream,
                                                   bool socket) const {
     if (socket && !origin_allowed(request)) return Refusal{"origin", "pages of this site may not watch here"};
-    auto by_link = refuse_path("watch/" + stream, request);
+    return refuse_without_token(request, stream, refuse_path("watch/" + stream, request));
+}
+
+std::optional<Refusal> Admission::refuse_segments(const Request& request, const std::string& stream,
+                                                  std::string_view link) const {
+    return refuse_without_token(request, stream, refuse_link("hls/" + stream, link));
+}
+
+std::optional<Refusal> Admission::refuse_without_token(const Request& request, const std::string& stream,
+                                                       std::optional<Refusal> by_link) const {
     if (!guards_watching() || (asks_for_links() && !by_link)) return by_link;
     const auto token = shown_token(request);
     const auto check = check_token(token, "watch", stream);

@@ -120,6 +120,13 @@ public:
                                              const Client& client) const;
     // Why somebody may not watch the stream, if so. socket: they ask for a WebSocket.
     std::optional<Refusal> refuse_watching(const Request& request, const std::string& stream, bool socket) const;
+    // Likewise its segments. link: as a target with a query; or "".
+    std::optional<Refusal> refuse_segments(const Request& request, const std::string& stream,
+                                           std::string_view link) const;
+    // Whether watching takes a token or is asked for: links are another thing.
+    bool guards_watching() const {
+        return options_.guard_watching && (credentials_.web_token_keys || options_.authority);
+    }
     // A place for another viewer who may watch.
     tl::expected<AddressCounts::Place, Refusal> place_for_viewer(const Client& client);
     // Both.
@@ -127,8 +134,6 @@ public:
                                                              bool socket, const Client& client);
     // Why the request may not read what is at this path, such as "files/anna.htvm", if so: there is need of a link.
     std::optional<Refusal> refuse_path(const std::string& path, const Request& request) const;
-    // Likewise, where the link's query is in this target.
-    std::optional<Refusal> refuse_link(const std::string& path, std::string_view target) const;
     // Why nobody may read what streams there are, if so.
     std::optional<Refusal> refuse_lists() const;
     bool may_read_metrics(const Request& request, const Client& client) const;
@@ -139,14 +144,13 @@ public:
     void let_others_read(const Request& request, ResponseHeader& header) const;
 
 private:
+    std::optional<Refusal> refuse_link(const std::string& path, std::string_view target) const;
     bool names_loopback(std::string_view host) const;
     bool by_program_here(const Request& request, const Client& client) const;
     bool origin_allowed(const Request& request) const;
     bool asks_for_links() const { return credentials_.link_keys.has_value(); }
-    // By web tokens, or by the authority; links are another thing.
-    bool guards_watching() const {
-        return options_.guard_watching && (credentials_.web_token_keys || options_.authority);
-    }
+    std::optional<Refusal> refuse_without_token(const Request& request, const std::string& stream,
+                                                std::optional<Refusal> by_link) const;
     std::optional<WebTokenCheck> check_token(std::string_view token, const char* action, std::string_view stream) const;
 
     AdmissionOptions options_;

@@ -144,25 +144,10 @@ net::awaitable<void> refuse(const Site& site, Line line, ResponseHeader header, 
     co_await line.close();
 }
 
-// What the authority says of what is refused otherwise: nothing if it lets it be.
-net::awaitable<std::optional<Refusal>> ask(const Site& site, const char* action, const std::string& stream,
-                                           const Request& request, const Client& client, Refusal otherwise) {
-    Question question{action, stream, client.address.to_string(), shown_token(request)};
-    const auto answer = co_await site.authority->ask(std::move(question));
-    if (answer == Answer::yes) co_return std::nullopt;
-    otherwise.cause = answer == Answer::no ? "authority" : "authority_silent";
-    otherwise.why = "whom this hub asks does not allow it";
-    if (answer == Answer::no) co_return otherwise;
-    otherwise.why = "this hub has no answer yet from whom it asks whether this is allowed";
-    otherwise.status = http::status::service_unavailable;
-    otherwise.code = CloseCode::try_later;
-    co_return otherwise;
-}
-
 net::awaitable<void> publish(const Site& site, Line line, Request request, std::string stream, Client client) {
     auto refusal = site.admission.refuse_publishing(request, stream, client);
     if (refusal && refusal->may_be_asked)
-        refusal = co_await ask(site, "publish", stream, request, client, std::move(*refusal));
+        refusal = co_await ask_authority(site, "publish", stream, request, client, std::move(*refusal));
     if (!refusal) {
         co_await publish_by_socket(std::move(line), std::move(request), std::move(stream), *site.hub);
         co_return;
@@ -182,7 +167,7 @@ net::awaitable<void> watch(const Site& site, Line line, Request request, Route r
     site.admission.let_others_read(request, header);
     auto refused = site.admission.refuse_watching(request, route.name, route.socket);
     if (refused && refused->may_be_asked)
-        refused = co_await ask(site, "watch", route.name, request, client, std::move(*refused));
+        refused = co_await ask_authority(site, "watch", route.name, request, client, std::move(*refused));
     using Place = tl::expected<AddressCounts::Place, Refusal>;
     const auto place = refused ? Place(tl::unexpect, *refused) : site.admission.place_for_viewer(client);
     if (!place) {
@@ -220,6 +205,20 @@ constexpr std::chrono::milliseconds between_texts{20}, between_walks{500};
 
 }  // namespace
 
+net::awaitable<std::optional<Refusal>> ask_authority(const Site& site, const char* action, const std::string& stream,
+                                                     const Request& request, const Client& client, Refusal otherwise) {
+    Question question{action, stream, client.address.to_string(), shown_token(request)};
+    const auto answer = co_await site.authority->ask(std::move(question));
+    if (answer == Answer::yes) co_return std::nullopt;
+    otherwise.cause = answer == Answer::no ? "authority" : "authority_silent";
+    otherwise.why = "whom this hub asks does not allow it";
+    if (answer == Answer::no) co_return otherwise;
+    otherwise.why = "this hub has no answer yet from whom it asks whether this is allowed";
+    otherwise.status = http::status::service_unavailable;
+    otherwise.code = CloseCode::try_later;
+    co_return otherwise;
+}
+
 SharedTexts::SharedTexts(const Site& site, const net::any_io_executor& executor)
     : streams(executor, between_texts,
               [&site]() -> net::awaitable<std::string> { co_return site.hub ? stream_list(*site.hub) : "null"; }),
@@ -256,7 +255,7 @@ net::awaitable<Response> answer(const Site& site, const Route& route, const Requ
             text = co_await site.texts->streams.fresh();
             co_return shared_response(std::move(text), json_type, std::move(header));
         case Handler::segments:
-            co_return co_await answer_segments(site, route.path, request, std::move(header));
+            co_return co_await answer_segments(site, route.path, request, client, std::move(header));
         case Handler::health:
             co_return text_response("ok\n", plain_text, std::move(header));
         case Handler::readiness:

@@ -61,6 +61,12 @@ struct Site {
 boost::asio::awaitable<Response> answer(const Site& site, const Route& route, const Request& request,
                                         const Client& client);
 
+// What the authority says of what is refused otherwise, where it may be asked: nothing if it lets it be. action: publish
+// or watch.
+boost::asio::awaitable<std::optional<Refusal>> ask_authority(const Site& site, const char* action,
+                                                             const std::string& stream, const Request& request,
+                                                             const Client& client, Refusal otherwise);
+
 // Publishes or watches, or says why not; then the connection has ended. route: a live one. has_place: whether the
 // client may have another connection.
 boost::asio::awaitable<void> carry(const Site& site, Line line, Request request, Route route, Client client,

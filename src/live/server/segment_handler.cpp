@@ -138,13 +138,16 @@ net::awaitable<Response> answer_asked(const Site& site, const Asked& asked, cons
 }  // namespace
 
 net::awaitable<Response> answer_segments(const Site& site, const std::vector<std::string>& path, const Request& request,
-                                         ResponseHeader header) {
+                                         const Client& client, ResponseHeader header) {
     site.admission.let_others_read(request, header);
     if (header.count(http::field::access_control_allow_origin))
         header.set(http::field::access_control_expose_headers, "Content-Range, ETag, Date, Age");
     const auto asked = asked_by(path);
     if (!asked || !site.segments) co_return empty_response(http::status::not_found, std::move(header));
-    if (const auto refusal = site.admission.refuse_link("hls/" + asked->stream, asked->link)) {
+    auto refusal = site.admission.refuse_segments(request, asked->stream, asked->link);
+    if (refusal && refusal->may_be_asked)
+        refusal = co_await ask_authority(site, "watch", asked->stream, request, client, std::move(*refusal));
+    if (refusal) {
         site.refusals.count(refusal->cause);
         co_return refusing_response(*refusal, std::move(header));
     }
@@ -153,6 +156,10 @@ net::awaitable<Response> answer_segments(const Site& site, const std::vector<std
         co_return empty_response(http::status::ok, std::move(header));
     }
     auto response = co_await answer_asked(site, *asked, request, std::move(header));
+    // What somebody may have by a token a cache must not hand to others.
+    if (auto kept = std::string(response.header[http::field::cache_control]);
+        site.admission.guards_watching() && kept.starts_with("public"))
+        response.header.set(http::field::cache_control, "private" + kept.substr(6));
     const auto kind = asked->file == playlist_name ? "playlist_" : "file_";
     ++site.traffic.segment_requests[kind + std::to_string(response.header.result_int())];
     if (request.method() != http::verb::head) site.traffic.segment_bytes += response.content.size();

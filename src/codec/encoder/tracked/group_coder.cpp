@@ -49,7 +49,7 @@ public:
             options.geometry_step *= finer;
             options.colour_step *= finer;
         }
-        auto encoded = encode_tracked_frame(held.mesh, held.surface, reference_, held.registered,
+        auto encoded = encode_tracked_frame(held.mesh, *held.surface, reference_, held.registered,
                                             between ? &*between : before_, {}, options, stages_);
         if (!encoded) return tl::unexpected(encoded.error());
         coded[frame.frame - 1] = std::move(*encoded);

@@ -15,7 +15,7 @@ struct HeldFrame {
     std::uint32_t number = 0;
     std::int64_t timestamp_us = 0;
     LatticeMesh mesh;  // as captured
-    SurfaceIndex surface;
+    std::shared_ptr<const SurfaceIndex> surface;
     NodeRegistration registered;
     FrameSteps steps;    // asked for
     RemovedNoise noise;  // of the capture

@@ -361,7 +361,8 @@ Result<CodedMotion> code_motion(const TrackedWork& work, const NodeRegistration&
     const auto& history = work.sequence.history;
     // Now and then a place to start from, for whoever has the reference.
     const auto since = work.sequence.next_frame - std::max(work.reference->decoded.number, history.access.value_or(0));
-    const bool from_last = history.frame && options.references == TrackedReferences::previous &&
+    const bool from_last = history.frame && !work.captured.force_access &&
+                           options.references == TrackedReferences::previous &&
                            std::int64_t{since} < options.access_interval;
     auto encoded = encode(work, registered, steps, parts, from_last ? &history.state : nullptr);
     if (!encoded) return tl::unexpected(encoded.error());

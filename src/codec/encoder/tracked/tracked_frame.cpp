@@ -165,6 +165,7 @@ std::vector<NodeMotions> motions_of(const NodeStarts& starts, const DeformableMe
     if (!starts.gone_on.empty()) out.emplace_back(starts.gone_on.begin(), starts.gone_on.end());
     if (!starts.skeletal.empty()) out.emplace_back(starts.skeletal.begin(), starts.skeletal.end());
     if (!starts.carried.empty()) out.emplace_back(starts.carried.begin(), starts.carried.end());
+    if (!starts.shared.empty()) out.emplace_back(starts.shared.begin(), starts.shared.end());
     return out;
 }
 
@@ -185,7 +186,12 @@ NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceI
     const auto from = motions_of(starts, deformable);
     NodeRegistration out;
     out.start = nearest_of(from, deformable, surface, options);
-    out.motion = register_deformation(deformable, surface, from[out.start], options, &out.form);
+    auto rounds = options;
+    if (!starts.shared.empty() && out.start + 1 == from.size()) {
+        rounds.coarse_rounds = 0;
+        rounds.middle_reach = options.near_reach;
+    }
+    out.motion = register_deformation(deformable, surface, from[out.start], rounds, &out.form);
     out.carried.assign(starts.carried.begin(), starts.carried.end());
     return out;
 }

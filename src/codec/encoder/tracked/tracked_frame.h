@@ -59,9 +59,10 @@ DeformableMesh make_tracked_deformable(const NodeReference& reference, const Sur
 
 // Possible starts of a registration, each one motion per node, or empty. last, before_last: of the two previous frames.
 // gone_on: behind a TP-frame, as the surface moved before it. skeletal: where the skeleton moves each node. carried:
-// where the capture's own vertices move it, if it has kept them.
+// where the capture's own vertices move it, if it has kept them. shared: as another encoder of the same capture found
+// that the surface moves: nearly right already.
 struct NodeStarts {
-    std::span<const RigidMotion> last, before_last, gone_on, skeletal, carried;
+    std::span<const RigidMotion> last, before_last, gone_on, skeletal, carried, shared;
 };
 struct NodeRegistration {
     std::vector<RigidMotion> motion;   // of each node, reference -> frame

@@ -3,6 +3,7 @@
 #include <iterator>
 #include <utility>
 
+#include "codec/encoder/tracked/shared_tracking.h"
 #include "core/parallel.h"
 
 namespace htvm::internal {
@@ -13,10 +14,15 @@ TrackedWork begin_work(const Configuration& configuration, const TrackedStrategy
     if (!ahead.surface) ahead.surface = surface_of(configuration, captured, stages);
     tracking.registered = std::move(ahead.registered);
     const auto effort = tracking_effort(captured.effort);
-    TrackedWork work{
-        configuration, strategy.sequence,        strategy.sequence.reference.get(), stages, std::move(captured),
-        effort,        std::move(*ahead.surface)};
-    if (can_refer(work)) register_once(work, tracking);
+    TrackedWork work{configuration, strategy.sequence,   strategy.sequence.reference.get(),
+                     stages,        std::move(captured), effort,
+                     ahead.surface, *ahead.surface};
+    if (!can_refer(work)) return work;
+    const auto& registered = register_once(work, tracking);
+    if (configuration.shared && !configuration.follows)
+        configuration.shared->add(work.captured.timestamp_us,
+                                  shared_step(configuration.header.lattice, work.reference->deformable,
+                                              work.sequence.history.last, registered.motion));
     return work;
 }
 
@@ -37,6 +43,7 @@ void find_surface(const Configuration& configuration, TrackedStrategy::Waiting& 
 void register_next(const TrackedWork& work, const Tracking& tracking, const TrackedAssumption& assumed,
                    TrackedStrategy::Waiting& next, std::vector<StageTime>& stages) {
     find_surface(work.configuration, next, stages);
+    if (work.configuration.follows) return;  // the other encoder has yet to come to that frame
     if (assumed.nodes && !tracking.lost && can_be_moved(work.sequence, next.captured.mesh))
         next.ahead.registered = register_frame(work.configuration, *work.reference, *next.ahead.surface, next.captured,
                                                {assumed.nodes->motion, work.sequence.history.last, {}, {}, {}},
@@ -178,7 +185,7 @@ Result<TrackedHandout> hold(TrackedStrategy& strategy, TrackedWork& work, Tracki
     auto& held = strategy.held;
     const bool place_to_start = motion.frame.access && (strategy.anchor || !held.empty());
     held.push_back({work.sequence.next_frame, work.captured.timestamp_us, std::move(work.captured.mesh),
-                    std::move(work.surface), std::move(*tracking.registered), motion.steps, std::move(motion.noise),
+                    work.kept_surface, std::move(*tracking.registered), motion.steps, std::move(motion.noise),
                     motion.frame.presence});
     const std::span<const HeldFrame> all = held;
     TrackedHandout out;

@@ -1,8 +1,10 @@
 #include "codec/encoder/tracked/tracked_work.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "codec/encoder/lattice_motion.h"
+#include "codec/encoder/tracked/shared_tracking.h"
 #include "surface/kept_vertices.h"
 
 namespace htvm::internal {
@@ -73,11 +75,23 @@ bool may_be_intra(const TrackedWork& work) {
     return frames_since_intra(work) >= work.configuration.options.least_key_interval;
 }
 
-SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame& captured,
-                        std::vector<StageTime>& stages) {
+std::shared_ptr<const SurfaceIndex> surface_of(const Configuration& configuration, const CapturedFrame& captured,
+                                               std::vector<StageTime>& stages) {
+    const auto& lattice = configuration.header.lattice;
+    const SurfaceKey key{captured.timestamp_us,
+                         lattice.origin,
+                         lattice.bits,
+                         configuration.options.tracked.effort,
+                         configuration.tells_presence(),
+                         captured.mesh.positions.size(),
+                         captured.colours.size()};
+    if (configuration.shared)
+        if (auto known = configuration.shared->surface(key)) return known;
     StageClock clock(stages);
-    auto out = captured_surface(captured.mesh, deformation_options(configuration));
-    if (!captured.colours.empty()) out.colours = captured.colours;
+    auto made = captured_surface(captured.mesh, deformation_options(configuration));
+    if (!captured.colours.empty()) made.colours = captured.colours;
+    auto out = std::make_shared<const SurfaceIndex>(std::move(made));
+    if (configuration.shared) configuration.shared->add(key, out);
     clock.done("search structures");
     return out;
 }
@@ -91,6 +105,11 @@ NodeRegistration register_frame(const Configuration& configuration, const Tracke
     const auto carried = carried_nodes(configuration, reference, captured.mesh, before, starts.last);
     starts.skeletal = skeletal;
     starts.carried = carried;
+    std::vector<RigidMotion> shared;
+    if (configuration.follows)
+        shared = configuration.shared->start(captured.timestamp_us, configuration.header.lattice, reference.deformable,
+                                             starts.last);
+    starts.shared = shared;
     auto options = deformation_options(configuration, tracking_effort(captured.effort));
     options.in_vain = in_vain;
     const auto present = shown_presence(reference, presence);
@@ -125,7 +144,7 @@ FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered,
     const auto there = shown_presence(*work.reference, present(work.sequence));
     options.present = there;
     out.any = follow_lost_limbs(work.reference->deformable, work.surface,
-                                {history.last, history.before_last, history.gone_on, skeletal, out.registered.carried},
+                                {history.last, history.before_last, history.gone_on, skeletal, out.registered.carried, {}},
                                 options, out.registered);
     clock.done("registration");
     return out;

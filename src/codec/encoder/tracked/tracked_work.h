@@ -79,7 +79,7 @@ struct TrackedSequence {
 
 // What was found of a frame that waits, while others were coded.
 struct TrackedAhead {
-    std::optional<SurfaceIndex> surface;
+    std::shared_ptr<const SurfaceIndex> surface;
     std::optional<NodeRegistration> registered;  // as if the frame before had been a T-frame
 };
 
@@ -131,7 +131,8 @@ struct TrackedWork {
     std::vector<StageTime>& stages;     // where times are added
     CapturedFrame captured;
     TrackingEffort effort;
-    SurfaceIndex surface;  // the captured surface, indexed by direction too; empty where there are no triangles
+    std::shared_ptr<const SurfaceIndex> kept_surface;
+    const SurfaceIndex& surface;  // the same: the captured surface, indexed by direction too; empty without triangles
 };
 
 // A frame without triangles is an I-frame that nothing refers to, and leaves the reference as it was.
@@ -150,9 +151,9 @@ inline CodedFrame& coded_frame(TrackedWork::Frame& frame) {
     return std::visit([](auto& of_kind) -> CodedFrame& { return of_kind.frame; }, frame);
 }
 
-// The captured surface, with the colours that serve tracking.
-SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame& captured,
-                        std::vector<StageTime>& stages);
+// The captured surface, with the colours that serve tracking; what another encoder has made of the same frame is taken.
+std::shared_ptr<const SurfaceIndex> surface_of(const Configuration& configuration, const CapturedFrame& captured,
+                                               std::vector<StageTime>& stages);
 
 // What of the reference is known to be there when a frame is registered: since that may begin while the frame before is
 // coded, what was there before that one. One per vertex, or none: all is. behind: of the frame behind the next one.

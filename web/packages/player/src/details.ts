@@ -1,4 +1,5 @@
 // What pages read of the element: the details of its events, its view, its statistics.
+import type { LadderNumbers } from './ladder_numbers.js';
 import type { LiveNumbers } from './live_state.js';
 import type { FailureCode } from './messages.js';
 import type { StatisticsSummary } from './statistics.js';
@@ -33,6 +34,8 @@ export interface PlayerStatistics extends StatisticsSummary {
     live: LiveNumbers | null;
     /** Texture pictures decoded and not shown yet. */
     picturesAhead: number;
+    /** Null where the stream comes in no segments. */
+    ladder: LadderNumbers | null;
 }
 
 /** Where the camera is: turned about a point. Degrees to the right and up, metres. */

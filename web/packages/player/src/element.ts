@@ -8,6 +8,7 @@ import { DrawingLoop } from './drawing_loop.js';
 import { frontOf } from './facing.js';
 import { StampBook, type FrameStamps } from './frame_stamps.js';
 import { FullScreen } from './full_screen.js';
+import { ladderNumbers } from './ladder_numbers.js';
 import type { FrameReport } from './messages.js';
 import { Overlay } from './overlay.js';
 import { Playback, type PlaybackListener } from './playback.js';
@@ -210,7 +211,7 @@ export class HtvmPlayerElement extends HTMLElement {
         const { wasmBytes, heldBytes } = this.#playback;
         return {
             ...this.#statistics.summary(), ...this.#display.held, framesShown: this.#shownFrames, wasmBytes, heldBytes,
-            live: this.#playback.live, picturesAhead: this.#playback.picturesAhead,
+            live: this.#playback.live, picturesAhead: this.#playback.picturesAhead, ladder: ladderNumbers(this.#playback),
         };
     }
 
@@ -381,7 +382,7 @@ export class HtvmPlayerElement extends HTMLElement {
         }
         this.#playback.setLoop(this.loop);
         const address = new URL(this.src, document.baseURI);
-        this.#playback.open(address.href, this.live || /^wss?:$/.test(address.protocol) ? 'live' : 'file');
+        this.#playback.open(address.href, (this.live && !address.pathname.endsWith('.m3u8')) || /^wss?:$/.test(address.protocol) ? 'live' : 'file');
         this.#sound.play((output) => this.#playback.makeSound(output));
         this.#stamps = new StampBook();
         this.#undrawn = null;
@@ -426,7 +427,7 @@ export class HtvmPlayerElement extends HTMLElement {
         this.#statistics.add(frame, now, picture);
         this.#undrawn = frame;
         const { panel } = this.#overlay;
-        if (!panel.hidden) panel.textContent = this.#statistics.text(frame, this.#playback.ahead, this.#playback.live);
+        if (!panel.hidden) panel.textContent = this.#statistics.text(frame, this.#playback);
         const { frame: number, letter, timeUs, vertices, triangles, topology, preview } = frame;
         const digest = (): number => this.#display.digest(frame);
         const detail: FramePresentedDetail = {

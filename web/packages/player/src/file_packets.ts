@@ -3,14 +3,10 @@ import {
     isAccess, isFrame, isReference, isStart, packetFlag, packetKind, PacketSplitter, type DecoderModule, type Packet,
 } from '@htvm/decoder';
 import { SourceError, type ByteSource } from './byte_source.js';
+import type { TimedPacket } from './stream_packets.js';
 
 // What packets are read from.
 type Bytes = Pick<ByteSource, 'read' | 'size' | 'contentType'>;
-
-/** A packet, and the media time of its frame, sound or picture: 0 is the first frame's. */
-export interface TimedPacket extends Packet {
-    timeUs: number;
-}
 
 const isIndex = ({ kind }: Packet): boolean => kind === packetKind.index || kind === packetKind.frontIndex;
 

@@ -2,11 +2,12 @@
 import {
     isAccess, isFrame, isKeyPicture, isReference, isReferred, isStart, packetKind, type DecoderModule, type Frame,
 } from '@htvm/decoder';
-import { ByteSource, Interrupted, SourceChanged, SourceError } from './byte_source.js';
-import { FilePackets, type TimedPacket } from './file_packets.js';
+import { Interrupted, SourceChanged, SourceError } from './byte_source.js';
 import type { Request } from './messages.js';
+import { StreamOpening } from './open_stream.js';
 import { otherTasks } from './other_tasks.js';
 import { PacketDecoder, Page, type OpenRequest, type Post, type Session } from './session.js';
+import type { StreamPackets, TimedPacket } from './stream_packets.js';
 
 const mostReopenings = 4;
 const roundingUs = 500; // so near before a frame's time, that frame is meant
@@ -20,8 +21,8 @@ export class FileSession implements Session {
     #module: DecoderModule;
     #page: Page;
     #decoder: PacketDecoder;
-    #source: ByteSource;
-    #file: FilePackets;
+    #opening: StreamOpening;
+    #stream: StreamPackets | null = null; // once its beginning has told what it is
     #timeUs: number;
     #traps: number[]; // times of frames that stopped the decoder before
     #passingOver: 'nothing' | 'to access' | 'to start' = 'nothing'; // after such a frame: up to one that does not need it
@@ -37,23 +38,19 @@ export class FileSession implements Session {
     #textured = false;
     #beyond: TimedPacket | null = null; // read already, behind what was sought
 
-    constructor(request: OpenRequest, module: DecoderModule, post: Post, source: ByteSource) {
+    constructor(request: OpenRequest, module: DecoderModule, post: Post, opening: StreamOpening) {
         this.#url = request.url;
-        this.#module = module;
-        this.#page = new Page(request, module, post, () => this.#source.heldBytes);
+        this.#page = new Page(request, module, post, () => this.#stream?.heldBytes ?? 0);
         this.#decoder = new PacketDecoder(module, this.#page);
         this.#timeUs = request.timeUs;
         this.#traps = request.traps;
         this.#loop = request.loop;
-        this.#source = source;
-        this.#file = new FilePackets(source, module);
+        this.#opening = opening;
+        this.#module = module;
     }
 
-    /** Its source, of which the beginning is being fetched. */
-    static fetch({ url }: OpenRequest): ByteSource {
-        const source = new ByteSource(url);
-        source.prefetch();
-        return source;
+    get #file(): StreamPackets {
+        return this.#stream!;
     }
 
     request(request: Request): void {
@@ -61,7 +58,7 @@ export class FileSession implements Session {
         if (request.type === 'loop') this.#loop = request.on;
         if (request.type === 'seek') {
             this.#timeUs = request.timeUs;
-            this.#source.interrupt();
+            this.#stream?.interrupt();
         }
         this.#page.wake();
     }
@@ -70,6 +67,7 @@ export class FileSession implements Session {
         for (;;) {
             const serial = this.#page.serial;
             try {
+                this.#stream ??= await this.#opening.open(this.#module, this.#page);
                 await this.#play(serial);
             } catch (error) {
                 if (error instanceof Interrupted) continue;
@@ -84,9 +82,9 @@ export class FileSession implements Session {
     }
 
     #reopen(): void {
-        this.#source.close();
-        this.#source = new ByteSource(this.#url);
-        this.#file = new FilePackets(this.#source, this.#module);
+        this.#stream?.close();
+        this.#stream = null;
+        this.#opening = new StreamOpening(this.#url);
         this.#surveyAt = 1;
         // Continue where decoding was, if it was beyond what was asked for.
         this.#timeUs = Math.max(this.#timeUs, this.#at);
@@ -99,8 +97,9 @@ export class FileSession implements Session {
         this.#page.forgetTopology();
         let sought: number | null = this.#timeUs;
         for (;;) {
-            this.#begin(sought ?? 0);
-            const last = await this.#seekAndShow(serial, sought ?? 0, sought === null);
+            const placeUs = await this.#begin(sought ?? 0);
+            if (this.#page.serial !== serial) return;
+            const last = await this.#seekAndShow(serial, placeUs, sought === null);
             if (last === 'superseded') return;
             this.#survey();
             sought = null;
@@ -108,10 +107,11 @@ export class FileSession implements Session {
                 const packet = this.#beyond ?? (await this.#file.next());
                 this.#beyond = null;
                 if (!packet) break;
+                if (packet.skippedUs) this.#loopUs -= packet.skippedUs;
                 const frame = this.#decode(packet, serial);
-                if (!frame) continue;
+                if (!frame || packet.passed) continue;
                 if (!(await this.#haveRoom(serial))) return;
-                this.#send(serial, frame, packet.timeUs, false);
+                this.#send(serial, frame, packet, false);
                 this.#decoder.prepare();
                 this.#survey();
             }
@@ -124,11 +124,13 @@ export class FileSession implements Session {
         this.#page.tellMemory();
     }
 
-    #begin(timeUs: number): void {
-        const header = this.#file.seek(timeUs);
+    // Returns what was sought, or the nearest place to it that there is.
+    async #begin(soughtUs: number): Promise<number> {
+        const { header, timeUs } = await this.#file.seek(soughtUs);
         this.#page.frames = 0;
         this.#beyond = null;
         this.#decoder.begin(header);
+        return timeUs;
     }
 
     // Reads on to the frame at that time and decodes only what it needs. quietly: without a preview, as in a loop.
@@ -141,7 +143,8 @@ export class FileSession implements Session {
             const pictures = group.filter(({ kind }) => kind === packetKind.texture);
             const beginUs = group.filter(isAccess).at(-1)?.timeUs ?? 0;
             if (pictures.length === 0 || pictures.some(isKeyPicture) || beginUs <= 0 || back > mostBackUs) break;
-            this.#begin(Math.max(0, beginUs - back));
+            await this.#begin(Math.max(0, beginUs - back));
+            if (this.#page.serial !== serial) return 'superseded';
         }
         let left = group.filter(({ kind }) => isFrame(kind)).length;
         const begin = group.map(isAccess).lastIndexOf(true); // before it is what it refers to
@@ -153,7 +156,7 @@ export class FileSession implements Session {
             const preview = left > 0;
             if (!preview || (place === begin && left > previewBeyond && !quietly)) {
                 if (!(await this.#haveRoom(serial))) return 'superseded';
-                this.#send(serial, frame, packet.timeUs, preview);
+                this.#send(serial, frame, packet, preview);
             }
             await otherTasks(); // a newer seek is heard between frames
             if (this.#page.serial !== serial) return 'superseded';
@@ -186,7 +189,8 @@ export class FileSession implements Session {
             if (isKeyPicture(packet)) keep(({ kind }) => kind !== packetKind.texture);
             group.push({ ...packet, bytes: packet.bytes.slice() });
             bytes += packet.size;
-            if (isFrame(packet.kind) && packet.timeUs + this.#file.frameUs > timeUs + roundingUs) there = true;
+            const later = packet.timeUs + this.#file.frameUs > timeUs + roundingUs;
+            if (isFrame(packet.kind) && later && !packet.passed) there = true;
             if ((there && (!this.#textured || packet.kind === packetKind.texture)) || bytes > mostGatheredBytes) break;
             if (packet.kind === packetKind.sequence) {
                 // Frames' duration is in it.
@@ -209,6 +213,8 @@ export class FileSession implements Session {
             return null;
         }
         this.#textured ||= packet.kind === packetKind.texture;
+        // A later picture may need it, whatever becomes of its frame.
+        if (packet.passed && packet.kind === packetKind.texture) this.#page.passOverPicture(packet);
         this.#page.sendPicture(packet, serial, packet.timeUs + this.#loopUs);
         if (packet.kind === packetKind.texture) return null;
         if (packet.kind === packetKind.index || packet.kind === packetKind.frontIndex) {
@@ -223,6 +229,7 @@ export class FileSession implements Session {
             if (this.#passingOver !== 'nothing') return null;
         }
         const { frame, error, decodeMs } = this.#decoder.decode(packet);
+        if (frame && !packet.passed) this.#file.decoded?.(decodeMs);
         if (error) {
             this.#lastError = error.message;
             if (error.code !== 'limit') this.#page.notice(`A part of the stream could not be decoded: ${error.message}`);
@@ -258,7 +265,7 @@ export class FileSession implements Session {
         if (this.#page.frames < this.#surveyAt) return;
         this.#surveyAt = Infinity;
         const again = 4 * Math.max(this.#page.frames, 1);
-        this.#file.survey(this.#source).then(
+        this.#file.survey().then(
             (done) => {
                 if (!done) this.#surveyAt = again;
                 this.#tellExtent();
@@ -277,10 +284,12 @@ export class FileSession implements Session {
         this.#tellExtent();
     }
 
-    #send(serial: number, { frame, decodeMs }: { frame: Frame; decodeMs: number }, timeUs: number, preview: boolean): void {
+    #send(serial: number, { frame, decodeMs }: { frame: Frame; decodeMs: number }, packet: TimedPacket, preview: boolean): void {
+        const { timeUs, rung } = packet;
         const presentUs = timeUs + this.#loopUs;
         const durationUs = this.#file.frameUs;
-        this.#page.sendFrame(this.#decoder, frame, { serial, timeUs, presentUs, durationUs, preview, decodeMs, live: null });
+        this.#page.sendFrame(this.#decoder, frame, { serial, timeUs, presentUs, durationUs, preview, decodeMs, live: null, rung });
+        this.#tellExtent();
         this.#decodedAny = true;
     }
 }

@@ -5,7 +5,7 @@ import { vertexNormals } from './normals.js';
 
 /** What the decoder does not say of a frame. */
 export type FrameContext = Pick<
-    FrameReport, 'serial' | 'timeUs' | 'presentUs' | 'durationUs' | 'preview' | 'decodeMs' | 'live'>;
+    FrameReport, 'serial' | 'timeUs' | 'presentUs' | 'durationUs' | 'preview' | 'decodeMs' | 'live' | 'rung'>;
 
 export class FrameSender {
     /** How many frames the page takes at once. */

@@ -37,6 +37,7 @@ export type Report =
     /** The decoder stopped, and this worker with it. atUs: media time of the packet that caused it. */
     | { type: 'trapped'; text: string; atUs: number }
     | { type: 'memory'; wasmBytes: number; heldBytes: number }
+    | LadderReport
     | LiveReport;
 
 /** What a live stream's hub and connection say. Times in ms are since 1970, by this machine's clock. */
@@ -48,6 +49,22 @@ export type LiveReport =
     | { type: 'gone'; reason: string }
     /** When a frame was sent and when it came to the hub, in microseconds since 1970 by the clocks there. */
     | { type: 'stamp'; frame: number; sentUs: number; hubUs: number };
+
+/** How the segments of a playlist come, after each. Its rungs are told where it has several qualities. */
+export interface LadderReport {
+    type: 'ladder';
+    /** Mbit/s of each rung, ascending, and the sizes of their pictures in pixels, where they are told. */
+    rungs: { megabitsPerSecond: number; resolution: string }[];
+    /** The rung that is fetched now, counted from 0, and why. */
+    rung: number;
+    reason: string;
+    /** What the line brought, by the last segments; null before there are any. */
+    lineMegabitsPerSecond: number | null;
+    /** That were fetched and not decoded yet. */
+    secondsFetched: number;
+    /** Whether segments are still being added. */
+    live: boolean;
+}
 
 export type FailureCode = 'missing' | 'network' | 'refused' | 'not-htvm' | 'empty' | 'version' | 'decoder' | 'changed';
 
@@ -119,6 +136,8 @@ export interface FrameReport {
     indices: Uint32Array | null;
     /** Null where there are none, and where the frame before of the same serial had the same reference topology. */
     texcoords: Float32Array | null;
+    /** Which of the playlist's rungs it is of; undefined where there is one quality alone. */
+    rung?: number | undefined;
     /** Set by the page. Number of the texture picture to be shown with it; null: there is none; undefined: not known yet. */
     picture?: number | null;
     /** Size of the picture's packet, if it has one of its own. */

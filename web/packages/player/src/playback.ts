@@ -5,7 +5,7 @@ import { FileTimeline } from './file_timeline.js';
 import { FrameQueue } from './frame_queue.js';
 import type { LiveNumbers, LiveStateDetail } from './live_state.js';
 import { LiveTimeline } from './live_timeline.js';
-import type { AudioReport, FailureCode, FrameReport, LiveReport, Report, SourceKind } from './messages.js';
+import type { AudioReport, FailureCode, FrameReport, LadderReport, LiveReport, Report, SourceKind } from './messages.js';
 import type { DecodedPicture } from './pictures.js';
 import type { PlaybackTime, SoundOutput, SoundTrack } from './sound_track.js';
 import type { TimedPlayback, Timeline } from './timeline.js';
@@ -50,6 +50,8 @@ export class Playback implements TimedPlayback {
     soughtUs = 0;
     wasmBytes = 0;
     heldBytes = 0;
+    /** How the segments of a playlist come; null where there are none. */
+    ladder: LadderReport | null = null;
     readonly now: () => number;
     #listener: PlaybackListener;
     #timeline: Timeline = new FileTimeline(this);
@@ -154,6 +156,7 @@ export class Playback implements TimedPlayback {
         this.#traps = [];
         this.#failed = false;
         this.durationUs = null;
+        this.ladder = null;
         this.#start(0);
     }
 
@@ -395,6 +398,9 @@ export class Playback implements TimedPlayback {
             case 'memory':
                 this.wasmBytes = report.wasmBytes;
                 this.heldBytes = report.heldBytes;
+                break;
+            case 'ladder':
+                this.ladder = report;
                 break;
             default:
                 if (report.type === 'link' && report.link === 'open' && this.ended) this.#goOn();

@@ -1,6 +1,7 @@
 // The panel's numbers, computed from the last frames shown.
+import { ladderLines, ladderNumbers } from './ladder_numbers.js';
 import type { LiveNumbers } from './live_state.js';
-import type { FrameReport } from './messages.js';
+import type { FrameReport, LadderReport } from './messages.js';
 import type { DecodedPicture } from './pictures.js';
 
 const kept = 60; // frames
@@ -63,7 +64,7 @@ export class Statistics {
         };
     }
 
-    text(frame: FrameReport, buffered: number, live: LiveNumbers | null): string {
+    text(frame: FrameReport, { ahead, live, ladder }: { ahead: number; live: LiveNumbers | null; ladder: LadderReport | null }): string {
         const { framesPerSecond, megabitsPerSecond, decodeMs, slowestDecodeMs, layers, pictures } = this.summary();
         const lines = [
             `frame    ${frame.frame} (${frame.letter}), ${frame.bytes} bytes`,
@@ -72,7 +73,8 @@ export class Statistics {
             `stream   ${megabitsPerSecond.toFixed(2)} Mbit/s`,
             ...(pictures ? [`pictures ${pictures.coder}, ${pictures.width} x ${pictures.height}, ${pictures.megabitsPerSecond.toFixed(2)} Mbit/s`] : []),
             `decoding ${decodeMs.toFixed(1)} ms, at most ${slowestDecodeMs.toFixed(1)}`,
-            `ahead    ${buffered} frames`,
+            `ahead    ${ahead} frames`,
+            ...ladderLines(ladderNumbers({ ladder, current: frame })),
             ...(live ? liveLines(live) : []),
             ...layers.slice(0, 5).map(({ name, share }, i) => {
                 return `${i === 0 ? 'bits' : '    '}     ${String(Math.round(100 * share)).padStart(2)} % ${name}`;

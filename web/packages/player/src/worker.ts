@@ -3,6 +3,7 @@ import { DecoderModule } from '@htvm/decoder';
 import { FileSession } from './file_session.js';
 import { LiveSession } from './live_session.js';
 import type { Report, Request, SourceKind } from './messages.js';
+import { StreamOpening } from './open_stream.js';
 import type { OpenRequest, Post, Session } from './session.js';
 
 const scope = globalThis as unknown as {
@@ -15,8 +16,8 @@ const post: Post = (report, transfer = []) => scope.postMessage(report, transfer
 type Opening = (request: OpenRequest) => (module: DecoderModule) => Session;
 const openings: Record<SourceKind, Opening> = {
     file: (request) => {
-        const source = FileSession.fetch(request);
-        return (module) => new FileSession(request, module, post, source);
+        const opening = new StreamOpening(request.url);
+        return (module) => new FileSession(request, module, post, opening);
     },
     live: (request) => (module) => new LiveSession(request, module, post),
 };

@@ -1,0 +1,102 @@
+// Fetches the files that a playlist names, and measures what the line brings.
+import { SourceError } from './byte_source.js';
+
+const retriesMs = [250, 750, 2000];
+const mostBytes = 1 << 26;
+const lookEveryMs = 200;
+const rateOverMs = 600; // what the line brings now is measured over so long
+const leastRest = 8192; // bytes behind the first ones, by which alone the line is measured
+const leastMs = 400; // of a transfer, before it can be given up
+
+/** How a transfer goes: bytes that have come, all that will (null: not told), and bits a second now. */
+export interface Progress {
+    bytes: number;
+    total: number | null;
+    bitsPerSecond: number;
+}
+
+export type Fetched =
+    | { outcome: 'here'; bytes: Uint8Array; bitsPerSecond: number; url: string }
+    /** The server does not have it. */
+    | { outcome: 'gone' }
+    | { outcome: 'given up'; bitsPerSecond: number };
+
+/**
+ * The file. Throws where no connection comes about, again and again, and where the signal aborts. giveUp: asked now and then
+ * whether to go on.
+ */
+export async function fetchFile(url: string, signal: AbortSignal, giveUp?: (progress: Progress) => boolean, fresh = false): Promise<Fetched> {
+    for (let attempt = 0; ; ++attempt) {
+        try {
+            const fetched = await tryToFetch(url, signal, giveUp, fresh);
+            if (fetched) return fetched;
+            if (attempt >= retriesMs.length) return { outcome: 'gone' };
+        } catch (error) {
+            if (signal.aborted) throw error;
+            if (attempt >= retriesMs.length)
+                throw new SourceError('network', `${url} could not be read: the connection failed, or the server does not allow pages of other sites to read it (CORS).`);
+        }
+        await new Promise((resolve) => setTimeout(resolve, retriesMs[attempt]));
+        if (signal.aborted) throw new Error('aborted');
+    }
+}
+
+// Null where it is worth trying again.
+async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: Progress) => boolean) | undefined, fresh: boolean): Promise<Fetched | null> {
+    const begin = performance.now();
+    const abort = new AbortController();
+    const stop = (): void => abort.abort();
+    signal.addEventListener('abort', stop);
+    let [bytes, total, givenUp] = [0, null as number | null, 0];
+    const marks: { at: number; bytes: number }[] = [{ at: begin, bytes: 0 }];
+    const rate = (): number => {
+        const now = performance.now();
+        while (marks.length > 1 && now - marks[1]!.at > rateOverMs) marks.shift();
+        return (8000 * (bytes - marks[0]!.bytes)) / Math.max(now - marks[0]!.at, 1);
+    };
+    const look = setInterval(() => {
+        const bitsPerSecond = rate();
+        marks.push({ at: performance.now(), bytes });
+        if (performance.now() - begin < leastMs || !giveUp?.({ bytes, total, bitsPerSecond })) return;
+        givenUp = Math.max(bitsPerSecond, 1);
+        abort.abort();
+    }, lookEveryMs);
+    try {
+        const response = await fetch(url, { signal: abort.signal, cache: fresh ? 'no-cache' : 'default' });
+        if (response.status === 404 || response.status === 410) return { outcome: 'gone' };
+        if (!response.ok) return null;
+        const length = Number(response.headers.get('Content-Length') ?? NaN);
+        if (length > 0 && !response.headers.get('Content-Encoding')) total = length;
+        const parts: Uint8Array[] = [];
+        let first = { at: performance.now(), bytes: 0 }; // until then much of the time is the way there and back
+        const reader = response.body!.getReader();
+        for (;;) {
+            const { done, value } = await reader.read();
+            if (done) break;
+            if (bytes === 0) first = { at: performance.now(), bytes: value.length };
+            bytes += value.length;
+            if (bytes > mostBytes) {
+                abort.abort();
+                return { outcome: 'gone' };
+            }
+            parts.push(value);
+        }
+        const whole = new Uint8Array(bytes);
+        let at = 0;
+        for (const part of parts) {
+            whole.set(part, at);
+            at += part.length;
+        }
+        const end = performance.now();
+        const ofAll = (8000 * bytes) / Math.max(end - begin, 1);
+        const rest = bytes - first.bytes;
+        const ofRest = rest < leastRest ? 0 : (8000 * rest) / Math.max(end - first.at, 1);
+        return { outcome: 'here', bytes: whole, bitsPerSecond: Math.max(ofAll, ofRest), url: response.url || url };
+    } catch (error) {
+        if (givenUp > 0) return { outcome: 'given up', bitsPerSecond: givenUp };
+        throw error;
+    } finally {
+        clearInterval(look);
+        signal.removeEventListener('abort', stop);
+    }
+}

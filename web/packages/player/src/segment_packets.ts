@@ -1,0 +1,375 @@
+// The segments of a playlist (docs/mp4.md) as the packets of their stream: some seconds are fetched ahead, each segment in the
+// rung that the line bears then (rung_choice.ts). Where another rung begins, as after a seek, what its first frame needs comes
+// before, as packets that are passed: so the next frame shown is the new rung's.
+import { packetKind, type Packet } from '@htvm/decoder';
+import { Interrupted, SourceError } from './byte_source.js';
+import type { LadderReport } from './messages.js';
+import { timed } from './mp4_packets.js';
+import { SampleReader } from './mp4_samples.js';
+import { boxesOf, Fields, readFragment, readMovie, Samples, type Movie } from './mp4_tables.js';
+import type { Segment } from './playlist.js';
+import { chooseRung, shouldGiveUp, type RungChoice } from './rung_choice.js';
+import { fetchFile, type Progress } from './segment_fetch.js';
+import { SegmentLists } from './segment_list.js';
+import type { Place, StreamPackets, TimedPacket } from './stream_packets.js';
+
+const aheadSeconds = 4; // are fetched before they are decoded
+const keptToRise = 1.5; // seconds of a lower rung that are kept where the line brings much more
+const muchMore = 2;
+const ratesKept = 4;
+const mapsKept = 8;
+const gapUs = 100000; // from here on time between two segments is left out
+const mendedUs = 1e6; // by which a segment's own time may differ from the list's
+
+/** A segment that was fetched. */
+interface Loaded {
+    segment: Segment;
+    rung: number;
+    movie: Movie;
+    reader: SampleReader;
+    /** What its first frame needs; null where it follows the segment before. */
+    needed: Packet[] | null;
+}
+
+export class SegmentPackets implements StreamPackets {
+    frameUs = 1e6 / 30;
+    #notice: (text: string) => void;
+    #report: (report: LadderReport) => void;
+    #lists: SegmentLists;
+    #maps = new Map<string, Uint8Array>();
+    #abort = new AbortController(); // of what is fetched since the last seek
+    #interrupts = 0;
+    #wakes: (() => void)[] = [];
+    #opened = false;
+    // What is fetched.
+    #nextNumber = 0;
+    #rung: number | null = null; // of the segment that was fetched last
+    #tracks: Movie | null = null; // of the rung; null: its map is to be fetched
+    #rates: number[] = [];
+    #atMost = { number: -1, rung: 0 }; // of a segment that was given up in a higher rung
+    #loaded: Loaded[] = [];
+    #complete = false;
+    #failure: unknown = null;
+    #choice: RungChoice = { rung: 0, reason: 'it begins low' };
+    // What is played.
+    #current: Loaded | null = null;
+    #sample = 0;
+    #ready: TimedPacket[] = [];
+    #originUs: number | null = null; // from a segment's own time to media time
+    #endUs: number | null = null; // of the segment before, since the last seek
+    #decodeMs = 0; // a frame
+
+    constructor(url: string, notice: (text: string) => void, report: (report: LadderReport) => void) {
+        this.#lists = new SegmentLists(url);
+        this.#notice = notice;
+        this.#report = report;
+    }
+
+    get durationUs(): number | null {
+        return this.#lists.endUs || null;
+    }
+    get pendingBytes(): number {
+        return 0;
+    }
+    get heldBytes(): number {
+        let sum = 0;
+        for (const map of this.#maps.values()) sum += map.length;
+        return this.#loaded.reduce((total, { movie }) => total + movie.tracks.reduce((all, { samples }) => all + samples.sizes.reduce((a, b) => a + b, 0), 0), sum);
+    }
+
+    async seek(soughtUs: number): Promise<Place> {
+        this.#abort.abort();
+        this.#abort = new AbortController();
+        const { signal } = this.#abort;
+        await this.#lists.open(signal);
+        // A live stream is joined at its end; afterwards any place in its window may be sought.
+        const joins = !this.#opened && soughtUs === 0 && this.#lists.live;
+        this.#opened = true;
+        const rung = Math.min(this.#rung ?? 0, this.#lists.rungs.length - 1);
+        if (!this.#lists.listOf(rung) || (this.#lists.live && this.#lists.goodForMs(rung) === 0)) await this.#lists.read(rung, signal);
+        this.#nextNumber = this.#lists.numberAt(rung, joins ? null : soughtUs);
+        this.#tracks = null;
+        this.#loaded = [];
+        this.#ready = [];
+        this.#current = null;
+        this.#endUs = null;
+        this.#complete = false;
+        this.#failure = null;
+        void this.#fill(signal);
+        const beginUs = this.#lists.beginUs(this.#nextNumber);
+        return { header: null, timeUs: joins ? beginUs : Math.max(soughtUs, beginUs) };
+    }
+
+    async next(): Promise<TimedPacket | null> {
+        const interrupts = this.#interrupts;
+        for (;;) {
+            const packet = this.#ready.shift();
+            if (packet) return packet;
+            if (this.#interrupts !== interrupts) throw new Interrupted();
+            const { samples = null } = this.#current?.movie.tracks.find(({ kind }) => kind === 'meshes') ?? {};
+            if (samples && this.#sample < samples.count) {
+                await this.#take(this.#current!, this.#sample++);
+            } else if (this.#loaded.length > 0) {
+                this.#current = this.#loaded.shift()!;
+                this.#sample = 0;
+                this.#wake();
+            } else {
+                this.#current = null;
+                if (this.#failure) throw this.#failure;
+                if (this.#complete) return null;
+                await this.#woken();
+            }
+        }
+    }
+
+    async survey(): Promise<boolean> {
+        return true;
+    }
+
+    decoded(milliseconds: number): void {
+        this.#decodeMs += (milliseconds - this.#decodeMs) / 30;
+    }
+
+    interrupt(): void {
+        ++this.#interrupts;
+        this.#wake();
+    }
+
+    close(): void {
+        this.#abort.abort();
+        this.interrupt();
+    }
+
+    #woken(): Promise<void> {
+        return new Promise((resolve) => this.#wakes.push(resolve));
+    }
+
+    #wake(): void {
+        for (const resolve of this.#wakes.splice(0)) resolve();
+    }
+
+    // ---- packets ------------------------------------------------------------------------------------------------------
+
+    async #take(loaded: Loaded, sample: number): Promise<void> {
+        const { packets, timeUs, baseUs, damagedBytes } = await loaded.reader.packetsOf(sample);
+        if (damagedBytes > 0) this.#notice('Parts of a segment are damaged, and are left out.');
+        const first = sample === 0;
+        if (first) this.#begin(loaded, timeUs);
+        const ownUs = timeUs + (this.#originUs ?? 0);
+        const base = (baseUs ?? 0) - (this.#originUs ?? 0);
+        const { rung } = loaded;
+        if (first && loaded.needed)
+            for (const packet of loaded.needed) {
+                const passed = packet.kind !== packetKind.sequence;
+                const neededUs = Math.min(packet.timestampUs - base, ownUs);
+                if (packet.kind !== packetKind.audio) this.#ready.push({ ...timed(packet, neededUs, base, passed), rung });
+            }
+        for (const packet of packets) this.#ready.push({ ...timed(packet, ownUs, base, false), rung });
+        if (!first) return;
+        const beginUs = this.#lists.beginUs(loaded.segment.number);
+        const skippedUs = this.#endUs === null ? 0 : beginUs - this.#endUs;
+        if (skippedUs > gapUs && this.#ready[0]) this.#ready[0].skippedUs = skippedUs;
+        this.#endUs = beginUs + loaded.segment.seconds * 1e6;
+    }
+
+    // Media time goes by the segments' own times, which are exact, unless they contradict the list.
+    #begin({ segment }: Loaded, timeUs: number): void {
+        const listedUs = this.#lists.beginUs(segment.number);
+        if (this.#originUs === null || Math.abs(timeUs + this.#originUs - listedUs) > mendedUs) this.#originUs = Math.round(listedUs - timeUs);
+    }
+
+    // ---- what is fetched ------------------------------------------------------------------------------------------------
+
+    get #ahead(): number {
+        let seconds = this.#loaded.reduce((sum, { segment }) => sum + segment.seconds, 0);
+        const samples = this.#current?.movie.tracks.find(({ kind }) => kind === 'meshes')!.samples;
+        if (samples) seconds += this.#current!.segment.seconds * (1 - this.#sample / Math.max(samples.count, 1));
+        return seconds;
+    }
+
+    async #fill(signal: AbortSignal): Promise<void> {
+        try {
+            while (!signal.aborted) {
+                if (this.#ahead >= aheadSeconds) {
+                    await this.#woken();
+                    continue;
+                }
+                const segment = await this.#chooseSegment(signal);
+                if (signal.aborted) return;
+                if (segment === 'none') break;
+                if (segment !== 'later') await this.#load(segment, signal);
+            }
+            if (!signal.aborted) this.#complete = true;
+        } catch (error) {
+            if (!signal.aborted) this.#failure = error;
+        }
+        if (!signal.aborted) this.#wake();
+    }
+
+    // The next segment in the rung to fetch it in. none: the stream has ended. later: it is not there yet, or another is to be asked for.
+    async #chooseSegment(signal: AbortSignal): Promise<Segment | 'none' | 'later'> {
+        this.#choose();
+        const { rung } = this.#choice;
+        if (!(await this.#haveList(rung, signal))) return 'later';
+        const list = this.#lists.listOf(rung)!;
+        const segment = this.#lists.segment(rung, this.#nextNumber);
+        if (segment) return segment;
+        if (this.#nextNumber < list.firstNumber) {
+            this.#notice('What comes next is no longer there: playing goes on nearer to the end.');
+            this.#nextNumber = this.#lists.numberAt(rung, list.ended ? 0 : null);
+            this.#tracks = null;
+            return list.segments.length > 0 ? 'later' : 'none';
+        }
+        if (list.ended) return 'none';
+        await pause(Math.max(this.#lists.goodForMs(rung), 100), signal);
+        if (!signal.aborted) await this.#lists.read(rung, signal);
+        // A publisher that begins again begins its numbers again.
+        const again = this.#lists.listOf(rung)!;
+        const last = again.firstNumber + again.segments.length;
+        if (this.#nextNumber > last && !signal.aborted) this.#nextNumber = this.#lists.numberAt(rung, null);
+        return 'later';
+    }
+
+    // Whether the rung's list is there; it is read where it is not, or may know of the segment by now.
+    async #haveList(rung: number, signal: AbortSignal): Promise<boolean> {
+        const list = this.#lists.listOf(rung);
+        const knows = list && (list.ended || this.#lists.segment(rung, this.#nextNumber) !== null);
+        if (knows || (list && this.#lists.goodForMs(rung) > 0)) return true;
+        try {
+            await this.#lists.read(rung, signal);
+            return true;
+        } catch (error) {
+            if (signal.aborted || this.#lists.rungs.length === 1) throw error;
+            this.#notice('One of the qualities of this stream cannot be read.');
+            this.#lists.drop(rung);
+            if (this.#rung !== null && this.#rung >= rung) this.#rung = null;
+            this.#tracks = null;
+            return false;
+        }
+    }
+
+    #choose(): void {
+        const rungs = this.#lists.rungs.map(({ bitsPerSecond }) => bitsPerSecond);
+        const last = this.#loaded.at(-1) ?? this.#current;
+        const segmentSeconds = last?.segment.seconds ?? 2;
+        this.#choice = chooseRung({
+            rungs, current: this.#rung, bitsPerSecond: this.#rates, aheadSeconds: this.#ahead, segmentSeconds,
+            decodeShare: (this.#decodeMs * 1000) / this.frameUs,
+        });
+        if (this.#atMost.number === this.#nextNumber && this.#choice.rung > this.#atMost.rung) this.#choice.rung = this.#atMost.rung;
+        const { rung } = this.#choice;
+        if (this.#rung === null || rung <= this.#rung || this.#rates.at(-1)! < muchMore * rungs[rung]!) return;
+        // What waits in a lower rung is fetched again, but for what is shown soon.
+        while (this.#loaded.length > 0 && this.#loaded.at(-1)!.rung < rung && this.#ahead - this.#loaded.at(-1)!.segment.seconds >= keptToRise)
+            this.#nextNumber = this.#loaded.pop()!.segment.number;
+    }
+
+    // Fetches it, and its map where its first frame needs what is there.
+    async #load(segment: Segment, signal: AbortSignal): Promise<void> {
+        const { rung } = this.#choice;
+        const anew = this.#tracks === null || rung !== this.#rung;
+        let map = anew ? await this.#map(segment, signal) : null;
+        if (signal.aborted) return;
+        if (anew && !map) return this.#leaveOut(segment);
+        const expectedBytes = (this.#lists.rungs[rung]!.bitsPerSecond * segment.seconds) / 8;
+        const lowestBits = (this.#lists.rungs[0]?.bitsPerSecond ?? 0) * segment.seconds;
+        const giveUp = ({ bytes, total, bitsPerSecond }: Progress): boolean =>
+            shouldGiveUp({
+                bitsLeft: Math.max(8 * ((total ?? expectedBytes) - bytes), 1), bitsPerSecond, rung, lowestBits,
+                aheadSeconds: this.#ahead, segmentSeconds: segment.seconds,
+            });
+        const fetched = await fetchFile(segment.url, signal, giveUp);
+        if (signal.aborted) return;
+        if (fetched.outcome === 'gone') return this.#leaveOut(segment);
+        if (fetched.outcome === 'given up') {
+            this.#atMost = { number: segment.number, rung: rung - 1 };
+            return this.#measured(fetched.bitsPerSecond);
+        }
+        this.#measured(fetched.bitsPerSecond);
+        try {
+            if (!map && hasOtherTracks(fetched.bytes, this.#tracks!)) {
+                map = await this.#map(segment, signal);
+                if (signal.aborted) return;
+            }
+            this.#loaded.push(this.#read(segment, rung, map, fetched.bytes, anew));
+        } catch (error) {
+            if (!(error instanceof SourceError)) throw error;
+            return this.#leaveOut(segment);
+        }
+        this.#rung = rung;
+        this.#nextNumber = segment.number + 1;
+        this.#wake();
+        this.#tell();
+    }
+
+    async #map({ mapUrl }: Segment, signal: AbortSignal): Promise<Uint8Array | null> {
+        const known = this.#maps.get(mapUrl);
+        if (known) return known;
+        const fetched = await fetchFile(mapUrl, signal);
+        if (fetched.outcome !== 'here') return null;
+        this.#maps.set(mapUrl, fetched.bytes);
+        for (const url of this.#maps.keys()) if (this.#maps.size > mapsKept) this.#maps.delete(url);
+        return fetched.bytes;
+    }
+
+    #read(segment: Segment, rung: number, map: Uint8Array | null, bytes: Uint8Array, anew: boolean): Loaded {
+        if (map) {
+            const moov = boxesOf(map).find(({ type }) => type === 'moov');
+            if (!moov) throw new SourceError('not-htvm', 'A map has no tables.');
+            this.#tracks = readMovie(moov.inside);
+        }
+        const tracks = this.#tracks!.tracks.map((track) => ({ ...track, samples: new Samples(), needs: new Map<number, number[]>() }));
+        const movie = { ...this.#tracks!, tracks };
+        for (const { type, begin, inside } of boxesOf(bytes, true)) if (type === 'moof') readFragment(movie, begin, inside);
+        if (tracks.find(({ kind }) => kind === 'meshes')!.samples.count === 0) throw new SourceError('not-htvm', 'A segment has no frames.');
+        const reader = new SampleReader(movie, async (offset, size) => (offset >= 0 && offset + size <= bytes.length ? bytes.subarray(offset, offset + size) : null));
+        return { segment, rung, movie, reader, needed: anew ? reader.configurationOf(0) : null };
+    }
+
+    #leaveOut({ number }: Segment): void {
+        this.#notice('A segment of the stream is gone, or cannot be read, and is left out.');
+        this.#nextNumber = number + 1;
+        this.#tracks = null;
+    }
+
+    #measured(bitsPerSecond: number): void {
+        this.#rates.push(bitsPerSecond);
+        if (this.#rates.length > ratesKept) this.#rates.shift();
+        this.#tell();
+    }
+
+    #tell(): void {
+        const rungs = this.#lists.rungs.map(({ bitsPerSecond, resolution }) => ({ megabitsPerSecond: bitsPerSecond / 1e6, resolution }));
+        const { rung, reason } = this.#choice;
+        const rate = this.#rates.at(-1);
+        this.#report({
+            type: 'ladder', rungs, rung, reason, lineMegabitsPerSecond: rate === undefined ? null : rate / 1e6, secondsFetched: this.#ahead,
+            live: this.#lists.live,
+        });
+    }
+}
+
+// Whether a segment has tracks that the map read last does not tell of.
+function hasOtherTracks(bytes: Uint8Array, { tracks }: Movie): boolean {
+    for (const moof of boxesOf(bytes, true).filter(({ type }) => type === 'moof'))
+        for (const traf of boxesOf(moof.inside).filter(({ type }) => type === 'traf'))
+            for (const header of boxesOf(traf.inside).filter(({ type }) => type === 'tfhd')) {
+                const fields = new Fields(header.inside);
+                fields.skip(4);
+                const id = fields.u32();
+                if (!tracks.some((track) => track.id === id)) return true;
+            }
+    return false;
+}
+
+function pause(milliseconds: number, signal: AbortSignal): Promise<void> {
+    return new Promise((resolve) => {
+        const end = (): void => {
+            clearTimeout(timer);
+            signal.removeEventListener('abort', end);
+            resolve();
+        };
+        const timer = setTimeout(end, milliseconds);
+        signal.addEventListener('abort', end);
+    });
+}
