@@ -22,7 +22,9 @@ bool is_playlist_name(const std::string& path) {
 }
 
 SegmentFolder::SegmentFolder(fs::path playlist, const SegmentOptions& options)
-    : path_(std::move(playlist)), options_(options), segmenter_({.seconds = options.seconds, .on_grid = options.on_grid}) {
+    : path_(std::move(playlist)),
+      options_(options),
+      segmenter_({.seconds = options.seconds, .on_grid = options.on_grid}) {
     list_.target_seconds = options.seconds;
     list_.has_end = false;
     list_.kind = !options.is_live             ? PlaylistKind::whole

@@ -25,8 +25,8 @@ struct SegmentCuts {
     double seconds = 2;       // a range ends at the first place where decoding can start that is so long behind its
                               // beginning; > 0
     double part_seconds = 0;  // it comes in parts that last no longer, unless a single frame does; 0: whole
-    bool on_grid = false;     // it ends at the first such place at or behind a multiple of `seconds`, so that streams of
-                              // the same frames, in which decoding can start there, are cut alike
+    bool on_grid = false;  // it ends at the first such place at or behind a multiple of `seconds`, so that streams of
+                           // the same frames, in which decoding can start there, are cut alike
 };
 
 // Cuts a stream where decoding can start.
@@ -71,8 +71,8 @@ struct StreamSegment {
 
 class StreamSegmenter {
 public:
-    // With parts, one after another is the segment. What a part's tables cannot say, as its map was written before, such
-    // as a picture of another size, is in whole packets until the next segment.
+    // With parts, one after another is the segment. What a part's tables cannot say, as its map was written before,
+    // such as a picture of another size, is in whole packets until the next segment.
     explicit StreamSegmenter(const SegmentCuts& cuts) : cutter_(cuts), in_parts_(cuts.part_seconds > 0) {}
     // Takes every packet, in order. An index in front goes into the first map.
     Result<std::optional<StreamSegment>> push(Packet packet);

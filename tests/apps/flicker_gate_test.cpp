@@ -157,13 +157,15 @@ Coded code_textured(const SynthOptions& capture) {
         const auto repeated = encoder->repeated_vertices();
         track->show(encoder->last_frame().frame, encoder->reconstruction(), {repeated.begin(), repeated.end()});
         TexturedMesh shown;
-        while (const auto packet = encoder->pull()) {
+        while (auto packet = encoder->pull()) {
             auto decoded = decoder.decode_copy(*packet);
             EXPECT_TRUE(decoded.has_value());
             if (decoded && *decoded) shown.mesh = std::move((*decoded)->mesh);
-            const auto picture = track->behind(*packet, packet->payload.size());
-            EXPECT_TRUE(picture.has_value());
-            if (picture && *picture && !pictures.decode(**picture)) ADD_FAILURE() << "a picture cannot be decoded";
+            const auto laid = track->lay_behind(std::move(*packet));
+            EXPECT_TRUE(laid.has_value());
+            for (const auto& one : laid ? *laid : std::vector<Packet>{})
+                if (one.kind == PacketKind::texture && !pictures.decode(one))
+                    ADD_FAILURE() << "a picture cannot be decoded";
         }
         shown.texture = pictures.image();
         if (!shown.texture) {

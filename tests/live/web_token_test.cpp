@@ -151,7 +151,8 @@ TEST_F(WebTokenTest, NobodyMakesOneWithoutTheKey) {
     for (std::size_t i = 0; i < good.size(); ++i) {
         auto changed = good;
         changed[i] = changed[i] == 'A' ? 'B' : 'A';
-        if (changed != good) EXPECT_NE(check(changed), WebTokenCheck::good) << i;
+        if (changed == good) continue;
+        EXPECT_NE(check(changed), WebTokenCheck::good) << i;
     }
     for (std::size_t size = 0; size < good.size(); ++size)
         EXPECT_NE(check(good.substr(0, size)), WebTokenCheck::good) << size;

@@ -227,8 +227,8 @@ std::optional<Refusal> Admission::refuse_path(const std::string& path, const Req
 
 std::optional<Refusal> Admission::refuse_link(const std::string& path, std::string_view target) const {
     if (!credentials_.link_keys) return std::nullopt;
-    const auto check = check_link(*credentials_.link_keys, path, target, std::chrono::system_clock::now(),
-                                  credentials_.revoked);
+    const auto check =
+        check_link(*credentials_.link_keys, path, target, std::chrono::system_clock::now(), credentials_.revoked);
     if (check == LinkCheck::good) return std::nullopt;
     const char* cause = check == LinkCheck::missing   ? "link_missing"
                         : check == LinkCheck::expired ? "link_expired"

@@ -57,8 +57,8 @@ std::string link_query(const LinkKeys& keys, std::string_view path, std::chrono:
 // A random one.
 std::string new_link_id();
 
-// The same as a segment of a path, for what names others beside it: EXPIRES-KEY-ID-SIGNATURE, without ID where there is none; and back, as a target with a
-// query. "" if it is none.
+// The same as a segment of a path, for what names others beside it: EXPIRES-KEY-ID-SIGNATURE, without ID where there is
+// none; and back, as a target with a query. "" if it is none.
 std::string link_segment(std::string_view query);
 std::string link_target(std::string_view segment);
 

@@ -61,8 +61,8 @@ struct Site {
 boost::asio::awaitable<Response> answer(const Site& site, const Route& route, const Request& request,
                                         const Client& client);
 
-// What the authority says of what is refused otherwise, where it may be asked: nothing if it lets it be. action: publish
-// or watch.
+// What the authority says of what is refused otherwise, where it may be asked: nothing if it lets it be. action:
+// publish or watch.
 boost::asio::awaitable<std::optional<Refusal>> ask_authority(const Site& site, const char* action,
                                                              const std::string& stream, const Request& request,
                                                              const Client& client, Refusal otherwise);

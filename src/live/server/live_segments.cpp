@@ -228,7 +228,8 @@ void LiveSegments::State::take(const std::string& name, const SharedPacket& pack
     if (begins_alone(packet->header)) {
         // Cameras come a little early now and then, and a segment is not to wait for the next access point for that.
         constexpr double early = 0.05;
-        work.segmenter.emplace((1 - early) * options.seconds, options.part_seconds);
+        work.segmenter.emplace(
+            SegmentCuts{.seconds = (1 - early) * options.seconds, .part_seconds = options.part_seconds});
         work.segment_begun = now;
         const auto before = std::exchange(work.before, {});
         push(name, work, work.header, now);

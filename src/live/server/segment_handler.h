@@ -26,7 +26,6 @@ struct Site;
 
 // path: the segments below /hls/.
 boost::asio::awaitable<Response> answer_segments(const Site& site, const std::vector<std::string>& path,
-                                                 const Request& request, const Client& client,
-                                                 ResponseHeader header);
+                                                 const Request& request, const Client& client, ResponseHeader header);
 
 }  // namespace htvm::live

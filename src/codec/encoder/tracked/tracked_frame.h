@@ -62,7 +62,7 @@ DeformableMesh make_tracked_deformable(const NodeReference& reference, const Sur
 // where the capture's own vertices move it, if it has kept them. shared: as another encoder of the same capture found
 // that the surface moves: nearly right already.
 struct NodeStarts {
-    std::span<const RigidMotion> last, before_last, gone_on, skeletal, carried, shared;
+    std::span<const RigidMotion> last{}, before_last{}, gone_on{}, skeletal{}, carried{}, shared{};
 };
 struct NodeRegistration {
     std::vector<RigidMotion> motion;   // of each node, reference -> frame
