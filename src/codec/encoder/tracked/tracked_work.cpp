@@ -143,9 +143,10 @@ FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered,
     auto options = deformation_options(work.configuration, work.effort);
     const auto there = shown_presence(*work.reference, present(work.sequence));
     options.present = there;
-    out.any = follow_lost_limbs(work.reference->deformable, work.surface,
-                                {history.last, history.before_last, history.gone_on, skeletal, out.registered.carried, {}},
-                                options, out.registered);
+    out.any =
+        follow_lost_limbs(work.reference->deformable, work.surface,
+                          {history.last, history.before_last, history.gone_on, skeletal, out.registered.carried, {}},
+                          options, out.registered);
     clock.done("registration");
     return out;
 }
