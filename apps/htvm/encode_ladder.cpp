@@ -54,10 +54,11 @@ Result<EncodePlan> plan_of_rung(const EncodeRequest& request, const Rung& rung, 
     auto own = request;
     own.ladder.clear();
     own.output = rung_name(request.output, number);
-    own.encoding.quality = rung.quality;
     if (rung.bits_per_second > 0) {
         own.encoding.given.emplace_back(find_option("rate.bits_per_second"), rung.bits_per_second);
         own.encoding.passes = 1;
+    } else {
+        own.encoding.quality = rung.quality;
     }
     auto plan = plan_of(own);
     if (!plan) return plan;

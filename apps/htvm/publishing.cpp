@@ -30,6 +30,16 @@ Result<std::string> checked_token(std::string token, const std::string& where) {
     return token;
 }
 
+}  // namespace
+
+Result<std::string> token_of_environment() {
+    const char* given = std::getenv("HTVM_TOKEN");
+    if (!given || !*given) return std::string();
+    return checked_token(given, "HTVM_TOKEN");
+}
+
+namespace {
+
 Result<std::string> token_of(const PublishingOptions& options) {
     if (!options.token_file.empty()) {
         std::ifstream file(options.token_file);
@@ -39,9 +49,7 @@ Result<std::string> token_of(const PublishingOptions& options) {
         return checked_token(line, options.token_file);
     }
     if (!options.token.empty()) return checked_token(options.token, "--token");
-    const char* given = std::getenv("HTVM_TOKEN");
-    if (!given || !*given) return std::string();
-    return checked_token(given, "HTVM_TOKEN");
+    return token_of_environment();
 }
 
 }  // namespace

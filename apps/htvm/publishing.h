@@ -18,6 +18,9 @@ class App;
 
 namespace htvm::app {
 
+// The token in HTVM_TOKEN, by which a hub knows who publishes or watches; "" if there is none.
+Result<std::string> token_of_environment();
+
 // Whose certificates are taken of hubs that speak TLS.
 struct HubTrust {
     std::string certificates;  // PEM file; empty: the system's

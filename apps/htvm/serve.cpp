@@ -395,7 +395,7 @@ void add_segments(CLI::App& command, Options& options) {
     auto* segments = add_seconds(
         command, "--segments", 2, {1, 60}, [&options](double seconds) { options.segments.emplace().seconds = seconds; },
         "Offer each live stream to HTTP caches and their viewers, too: /hls/NAME/stream.m3u8 is a playlist (HLS) of "
-        "segments of at least so many seconds (default 2), cut where players can start");
+        "segments of about so many seconds (default 2), cut where players can start");
     command
         .add_option("--window", options.window_seconds,
                     "Seconds of each stream that its playlist has, so far can viewers go back (default 60)")

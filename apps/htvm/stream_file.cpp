@@ -43,6 +43,9 @@ Result<Watcher> open_watcher(const std::string& address, std::size_t max_packet_
     WatcherOptions options;
     options.certificates = trust.certificates;
     options.insecure = trust.insecure;
+    auto token = token_of_environment();
+    if (!token) return tl::unexpected(token.error());
+    options.token = std::move(*token);
     options.largest_packet = std::min(max_packet_bytes, options.largest_packet);
     options.is_stopped = [] { return interruption() != 0; };
     options.trouble = warn_once();

@@ -31,6 +31,7 @@ namespace htvm {
 
 struct WatcherOptions {
     std::string certificates{};  // PEM file of those who may vouch for a hub's; empty: the system's
+    std::string token{};         // shown to hubs that ask who watches; one line of printable characters; empty: none
     bool insecure = false;       // takes any certificate: for tests alone
     std::size_t largest_packet = std::size_t{1} << 28;  // bytes of its payload; the connection ends at larger ones
     std::function<bool()> is_stopped{};                 // asked ten times a second by next(); empty: never

@@ -23,7 +23,7 @@ hub() {
 }
 
 "$htvm" synth walk --frames 12 --vertices 300 >/dev/null 2>&1
-"$htvm" encode walk --keyint 6 -o walk.htvm 2>/dev/null
+"$htvm" encode walk --keyint 6 --group 1 -o walk.htvm 2>/dev/null # in groups, who joins within one begins with a gap
 "$htvm" decode walk.htvm -o meshes 2>/dev/null
 
 hub serve 0

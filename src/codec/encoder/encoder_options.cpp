@@ -308,8 +308,9 @@ constexpr Option list[] = {
      .kind = OptionKind::word,
      .meaning =
          "the meshes that T-frames refer to as a base mesh, subdivided, with detail as displacements: about half the "
-         "bits, for a second or more of encoding each; auto, from effort 3 on where surface does not come and go and "
-         "there is no texture; on, at any effort; off, all vertices are coded alike",
+         "bits, for a second or more of encoding each; auto, from effort 3 on where that costs less, surface does not "
+         "come and go, there is no texture and nobody watches live; on, at any effort; off, all vertices are coded "
+         "alike",
      .words = reference_levels,
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.levels); },
      .set = [](EncoderOptions& o, double value) { o.tracked.levels = static_cast<ReferenceLevels>(value); },

@@ -110,6 +110,7 @@ Result<Watcher> Watcher::open(const std::string& url, const WatcherOptions& opti
     HubClientOptions client;
     client.certificates = options.certificates;
     client.insecure = options.insecure;
+    client.token = options.token;
     client.largest_message = options.largest_packet + packet_overhead;
     auto created = HubClient::create({std::move(*address)}, client, state->talk());
     if (!created) return tl::unexpected(created.error());
