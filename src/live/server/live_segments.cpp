@@ -213,7 +213,9 @@ void LiveSegments::State::take(const std::string& name, const SharedPacket& pack
         work.discontinuity = shown.ended.has_value();
         if (std::exchange(shown.ended, std::nullopt)) forget_all(shown);
         shown.share = work.share;
-        shown.next_number = std::max(shown.next_number, static_cast<std::uint64_t>(unix_ms() / 1000));
+        // A hub that was started again goes on with higher numbers than before, if there were fewer than four segments
+        // a second: rounds of a loop may end in short ones.
+        shown.next_number = std::max(shown.next_number, static_cast<std::uint64_t>(unix_ms() / 250));
     }
     const auto kind = packet->header.kind;
     if (kind == PacketKind::sequence && (!work.header || !same_bytes(packet, work.header))) {
