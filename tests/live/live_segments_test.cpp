@@ -286,6 +286,15 @@ TEST_F(SegmentsServerTest, ALinkIsAPartOfThePath) {
     EXPECT_EQ(status(get("/hls/1-1-00/anna/check")), 403);
     const auto list = read_playlist(body(get(link + "/anna/stream.m3u8"))).value();
     EXPECT_EQ(status(get(link + "/anna/" + list.segments.at(0).uri)), 200);
+    const auto named = "/hls/" + link_segment(link_query(keys, "hls/anna", later, "5f0c1e9a"));
+    EXPECT_EQ(status(get(named + "/anna/stream.m3u8")), 200);
+}
+
+TEST_F(SegmentsServerTest, AreAskedForAsWatchingIs) {
+    options.authority.url = "http://127.0.0.1:9/may";  // where nobody answers
+    start();
+    EXPECT_EQ(status(get("/hls/anna/stream.m3u8")), 503);
+    EXPECT_EQ(status(get("/hls/anna/check")), 503);
 }
 
 TEST_F(SegmentsServerTest, CountsWhatWasAskedFor) {
