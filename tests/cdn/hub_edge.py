@@ -231,7 +231,7 @@ def check_links(bench):
 
 def check_parts(playlist):
     """Who has the playlist asks for the part that is next, and has it as soon as it is there."""
-    text = get(EDGE, playlist)[0].decode()
+    text = get(HUB, playlist)[0].decode()  # the edge's may be a second old
     number = number_of(text.encode()) + len(re.findall("#EXTINF", text))
     before = counted()[0]
     with concurrent.futures.ThreadPoolExecutor(20) as pool:
