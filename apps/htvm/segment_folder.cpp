@@ -180,7 +180,7 @@ Result<FileBytes> source_of_playlist(const std::string& path) {
     const auto bytes = read_file(path);
     if (!bytes) return tl::unexpected(bytes.error());
     const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
-    // Of several qualities the finest.
+    // The finest, where there are several qualities.
     if (const auto variants = read_variants(text); !variants.empty()) {
         const auto& finest = *std::max_element(variants.begin(), variants.end(), [](const auto& a, const auto& b) {
             return a.bits_per_second < b.bits_per_second;

@@ -123,7 +123,7 @@ std::string date(std::int64_t unix_ms) {
     return std::string(out.data()) + thousandths.data();
 }
 
-// Of a playlist of parts: players ask for what is not there yet, and stay so far behind the end.
+// What a playlist of parts says: players ask for what is not there yet, and stay so far behind the end.
 std::string live_control(const Playlist& playlist) {
     constexpr double parts_behind = 3;
     return "#EXT-X-SERVER-CONTROL:CAN-BLOCK-RELOAD=YES,PART-HOLD-BACK=" +

@@ -81,7 +81,7 @@ namespace Htvm
 
         public void Pause() { Playing = false; }
 
-        // Of a file: the frame of that time is shown at the next update, whether it plays or not.
+        // Seeks in a file: the frame of that time is shown at the next update, whether it plays or not.
         public void Seek(double to) { seconds = Math.Min(Math.Max(to, 0), Duration); }
 
         public void Close()

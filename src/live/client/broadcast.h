@@ -36,7 +36,7 @@ struct LivePacket {
     bool is_access() const;
 };
 using SharedPacket = std::shared_ptr<const LivePacket>;
-// Of a packet that is whole.
+// The packet, which must be whole, taken apart.
 Packet packet_of(const LivePacket& packet);
 
 struct BroadcastLimits {

@@ -80,7 +80,7 @@ struct Segment {
     PlaylistSegment entry;  // with all its parts
 };
 
-// Of one stream. Whatever is in `files` can be asked for; the lists say what is in the playlist.
+// One stream is shown so. Whatever is in `files` can be asked for; the lists say what is in the playlist.
 struct Shown {
     HubMemory::SharedShare share;
     std::map<std::string, Piece, std::less<>> files;
@@ -288,7 +288,7 @@ void LiveSegments::State::finish(const std::string& name, Work& work) {
     close_segment(streams[name], work);
 }
 
-// Of an unfinished segment those parts stay that players may have already.
+// Those parts of an unfinished segment stay that players may have already.
 void LiveSegments::State::lose(const std::string& name, Work& work) {
     work.segmenter.reset();
     work.before.clear();
