@@ -24,13 +24,13 @@ def run(*words):
 
 
 def stream_of(htvm, megabits):
-    """Path of a synthetic person of four seconds, encoded at this rate."""
+    """Path of a synthetic person of four seconds, encoded at this rate as live streams are: no frame takes long."""
     capture, path = os.path.join(WORK, "capture"), os.path.join(WORK, f"person_{megabits}.htvm")
     if not os.path.exists(path):
         os.makedirs(WORK, exist_ok=True)
         print(f"encoding {path}, once", file=sys.stderr)
         run(htvm, "synth", capture, "--frames", FRAMES, "--fps", FPS)
-        run(htvm, "encode", capture, "--bitrate", megabits, "-o", path + ".new")
+        run(htvm, "encode", capture, "--bitrate", megabits, "--buffer", 0.25, "-o", path + ".new")
         os.rename(path + ".new", path)
     return path
 

@@ -61,8 +61,7 @@ std::vector<RigidMotion> carried_by_vertices(const DeformableMesh& mesh, std::sp
     parallel_for(out.size(), options.threads, 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t h = begin; h < end; ++h) {
             const RigidMotion step = of_handle[h].size() < options.fewest ? of_all : step_of(vertices, of_handle[h]);
-            const RigidMotion before = last.empty() ? RigidMotion{} : last[h];
-            out[h] = {step.rotation * before.rotation, step(before.shift)};
+            out[h] = last.empty() ? step : step * last[h];
         }
     });
     return out;

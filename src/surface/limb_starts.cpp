@@ -199,10 +199,7 @@ std::vector<RigidMotion> reached_for_extremities(const DeformableMesh& mesh, con
         const auto tip = limbs[i].handles.front(), root = limbs[i].handles.back();
         const auto was = [&](std::uint16_t h) { return last.empty() ? RigidMotion{} : last[h]; };
         // How the root has moved since `last`.
-        const auto back = was(root).inverse();
-        RigidMotion carried;
-        carried.rotation = motions[root].rotation * back.rotation;
-        carried.shift = motions[root].rotation * back.shift + motions[root].shift;
+        const RigidMotion carried = motions[root] * was(root).inverse();
         const Vector3d from = motions[root](mesh.handles[root]);
         const Vector3d end = carried(was(tip)(mesh.handles[tip]));
         const auto nearest = std::min_element(free.begin(), free.end(), [&](const Vector3d& a, const Vector3d& b) {

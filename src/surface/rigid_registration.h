@@ -14,6 +14,8 @@ struct RigidMotion {
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();
     Eigen::Vector3d operator()(const Eigen::Vector3d& x) const { return rotation * x + shift; }
     RigidMotion inverse() const { return {rotation.transpose(), -(rotation.transpose() * shift)}; }
+    // This one behind `first`.
+    RigidMotion operator*(const RigidMotion& first) const { return {rotation * first.rotation, (*this)(first.shift)}; }
 };
 
 // The rigid motion that takes `from` nearest to `to` pair by pair in the least-squares sense (Kabsch 1976); needs at

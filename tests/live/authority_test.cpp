@@ -4,10 +4,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
+#include <openssl/x509v3.h>
 
 #include <atomic>
+#include <boost/asio/ssl.hpp>
 #include <boost/beast/http.hpp>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <functional>
 #include <mutex>
@@ -44,11 +49,41 @@ TEST(Authority, ItsAddressIsOneOfHttp) {
         EXPECT_FALSE(Authority::open({.url = wrong})) << wrong;
 }
 
-// A service that answers each question by what a test gives: a status and headers; 0: never.
+// A certificate that vouches for itself, and its key, both in one file.
+void write_certificate(const std::string& path, const std::string& subject_alternative_name) {
+    const std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)> key(EVP_EC_gen("P-256"), EVP_PKEY_free);
+    const std::unique_ptr<X509, decltype(&X509_free)> certificate(X509_new(), X509_free);
+    X509_set_version(certificate.get(), 2);
+    ASN1_INTEGER_set(X509_get_serialNumber(certificate.get()), 1);
+    X509_gmtime_adj(X509_getm_notBefore(certificate.get()), -60);
+    X509_gmtime_adj(X509_getm_notAfter(certificate.get()), 3600);
+    X509_set_pubkey(certificate.get(), key.get());
+    X509_NAME* name = X509_get_subject_name(certificate.get());
+    X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_ASC, reinterpret_cast<const unsigned char*>("service"), -1, -1, 0);
+    X509_set_issuer_name(certificate.get(), name);
+    const std::unique_ptr<X509_EXTENSION, decltype(&X509_EXTENSION_free)> alternative(
+        X509V3_EXT_conf_nid(nullptr, nullptr, NID_subject_alt_name, subject_alternative_name.c_str()),
+        X509_EXTENSION_free);
+    X509_add_ext(certificate.get(), alternative.get(), -1);
+    ASSERT_GT(X509_sign(certificate.get(), key.get(), EVP_sha256()), 0);
+    const std::unique_ptr<FILE, decltype(&std::fclose)> file(std::fopen(path.c_str(), "w"), std::fclose);
+    ASSERT_TRUE(file);
+    ASSERT_EQ(PEM_write_X509(file.get(), certificate.get()), 1);
+    ASSERT_EQ(PEM_write_PrivateKey(file.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr), 1);
+}
+
+// A service that answers each question by what a test gives: a status and headers; 0: never. By TLS if it has a
+// certificate.
 class Service {
 public:
-    explicit Service(std::function<std::pair<unsigned, std::string>(const nlohmann::json&)> answer)
+    explicit Service(std::function<std::pair<unsigned, std::string>(const nlohmann::json&)> answer,
+                     const std::string& certificate = "")
         : answer_(std::move(answer)), acceptor_(context_, {net::ip::make_address("127.0.0.1"), 0}) {
+        if (!certificate.empty()) {
+            tls_.emplace(net::ssl::context::tls_server);
+            tls_->use_certificate_file(certificate, net::ssl::context::pem);
+            tls_->use_private_key_file(certificate, net::ssl::context::pem);
+        }
         thread_ = std::thread([this] { run(); });
     }
     ~Service() {
@@ -60,7 +95,10 @@ public:
         last.close();
         thread_.join();
     }
-    std::string url() const { return "http://127.0.0.1:" + std::to_string(acceptor_.local_endpoint().port()) + "/may"; }
+    std::string url() const {
+        return (tls_ ? "https" : "http") +
+               ("://127.0.0.1:" + std::to_string(acceptor_.local_endpoint().port()) + "/may");
+    }
     std::vector<nlohmann::json> asked() const {
         const std::lock_guard lock(mutex_);
         return asked_;
@@ -73,31 +111,41 @@ private:
             tcp::socket socket(context_);
             beast::error_code error;
             acceptor_.accept(socket, error);
-            beast::flat_buffer buffer;
-            http::request<http::string_body> request;
-            http::read(socket, buffer, request, error);
-            if (error) continue;
-            const auto question = nlohmann::json::parse(request.body(), nullptr, false);
-            const auto [status, headers] = answer_(question);
-            {
-                const std::lock_guard lock(mutex_);
-                asked_.push_back(question);
-            }
-            if (status == 0) {
+            if (tls_) {
+                net::ssl::stream<tcp::socket&> secure(socket, *tls_);
+                secure.handshake(net::ssl::stream_base::server, error);
+                if (!error) answer(secure);
+            } else if (!answer(socket)) {
                 silent.push_back(std::move(socket));
-                continue;
             }
-            net::write(
-                socket,
-                net::buffer("HTTP/1.1 " + std::to_string(status) + " X\r\n" + headers + "Content-Length: 0\r\n\r\n"),
-                error);
         }
+    }
+    // Whether there was an answer, or no question.
+    template <typename Stream>
+    bool answer(Stream& stream) {
+        beast::error_code error;
+        beast::flat_buffer buffer;
+        http::request<http::string_body> request;
+        http::read(stream, buffer, request, error);
+        if (error) return true;
+        const auto question = nlohmann::json::parse(request.body(), nullptr, false);
+        const auto [status, headers] = answer_(question);
+        {
+            const std::lock_guard lock(mutex_);
+            asked_.push_back(question);
+        }
+        if (status == 0) return false;
+        net::write(stream,
+                   net::buffer("HTTP/1.1 " + std::to_string(status) + " X\r\n" + headers + "Content-Length: 0\r\n\r\n"),
+                   error);
+        return true;
     }
     std::function<std::pair<unsigned, std::string>(const nlohmann::json&)> answer_;
     std::atomic<bool> ending_ = false;
     mutable std::mutex mutex_;
     std::vector<nlohmann::json> asked_;
     net::io_context context_;
+    std::optional<net::ssl::context> tls_;
     tcp::acceptor acceptor_;
     std::thread thread_;
 };
@@ -179,6 +227,26 @@ TEST_F(AskedServerTest, AServiceThatIsNotThereLetsNobodyIn) {
     options.authority.url = "http://127.0.0.1:1/";
     start();
     EXPECT_EQ(open("/publish/anna?token=a").status, 503u);
+}
+
+TEST_F(AskedServerTest, OneByTlsIsBelievedIfItsCertificateIsTrustedAndForItsAddress) {
+    const auto certificate = (root / "service.pem").string(), other = (root / "other.pem").string();
+    write_certificate(certificate, "IP:127.0.0.1");
+    write_certificate(other, "IP:127.0.0.2");
+    const auto status_by = [&](const std::string& shown, const std::string& trusted) {
+        Service service([](const nlohmann::json&) { return std::pair(200u, std::string()); }, shown);
+        options.authority.url = service.url();
+        ::setenv("SSL_CERT_FILE", trusted.c_str(), 1);
+        start();
+        ::unsetenv("SSL_CERT_FILE");
+        const auto got = open("/publish/anna?token=a").status;
+        EXPECT_EQ(service.asked().size(), got == 101u ? 1u : 0u);
+        stop();
+        return got;
+    };
+    EXPECT_EQ(status_by(certificate, certificate), 101u);
+    EXPECT_EQ(status_by(certificate, other), 503u);
+    EXPECT_EQ(status_by(other, other), 503u);
 }
 
 TEST_F(AskedServerTest, QuestionsBeyondWhatIsAllowedHaveNoAnswer) {

@@ -37,7 +37,7 @@ test_in_parts() {
 for name in test_core test_entropy test_surface test_c_api test_codec; do test_in_parts "$name"; done
 # Servers, each with two threads for its connections.
 HTVM_LINE_THREADS=2 check "test_live" "$build/test_live" --gtest_brief=1 \
-    --gtest_filter='LineThreads*:HttpServer*:ServerAccess*:Asked*:LiveConnection*:CLive*' || failures=$((failures + 1))
+    --gtest_filter='LineThreads*:HttpServer*:ServerAccess*:Asked*:LiveConnection*:CLive*:SegmentsServer*' || failures=$((failures + 1))
 
 htvm=$build/htvm
 "$htvm" synth "$logs/capture" --frames 12 --vertices 4000 >"$logs/synth.log" 2>&1

@@ -172,9 +172,9 @@ std::vector<InnerSample> places_of_detail(const SurfaceDetail& detail, std::size
 TargetPlaces places_on_detail(const MovedReference& moved) {
     const auto& detail = *moved.detail;
     const std::size_t vertices = moved.positions.size(), levels = levels_to_sample(detail, vertices);
-    const std::span<const Triangle> triangles = levels > 0 ? detail.triangles(levels) : moved.triangles;
+    const std::span<const Triangle> triangles = detail.triangles(levels);
     std::vector<LatticePoint> shown(moved.positions.begin(), moved.positions.end());
-    if (levels > 0) add_detail(detail, levels, moved.triangles, shown);
+    add_detail(detail, levels, moved.triangles, shown);
     TargetPlaces out;
     out.samples = {points_of(shown), points_of(vertex_normals(shown, triangles))};
     std::vector<float> weight(shown.size(), 0);
@@ -187,7 +187,7 @@ TargetPlaces places_on_detail(const MovedReference& moved) {
         out.inner.push_back({places[v].corners, places[v].shares, weight[v]});
     if (moved.colours.empty()) return out;
     out.colours.assign(moved.colours.begin(), moved.colours.end());
-    if (levels > 0) add_detail(detail, levels, out.colours);
+    add_detail(detail, levels, out.colours);
     out.colours.erase(out.colours.begin(), out.colours.begin() + static_cast<std::ptrdiff_t>(vertices));
     return out;
 }

@@ -22,12 +22,8 @@ SharedStep shared_step(const Lattice& lattice, const DeformableMesh& mesh, std::
     out.lattice = lattice;
     for (std::size_t h = 0; h < now.size(); ++h) {
         const auto was = before.empty() ? RigidMotion{} : before[h];
-        const auto back = was.inverse();
         out.before.push_back(was(mesh.handles[h]));
-        RigidMotion step;
-        step.rotation = now[h].rotation * back.rotation;
-        step.shift = now[h].rotation * back.shift + now[h].shift;
-        out.motion.push_back(step);
+        out.motion.push_back(now[h] * was.inverse());
     }
     return out;
 }
@@ -65,10 +61,7 @@ std::vector<RigidMotion> SharedTracking::start(std::int64_t timestamp_us, const 
             return (a - place).squaredNorm() < (b - place).squaredNorm();
         });
         const auto& step = motion[static_cast<std::size_t>(nearest - before.begin())];
-        RigidMotion start;
-        start.rotation = step.rotation * own.rotation;
-        start.shift = step.rotation * own.shift + step.shift;
-        out.push_back(start);
+        out.push_back(step * own);
     }
     return out;
 }
