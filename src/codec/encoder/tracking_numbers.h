@@ -67,7 +67,8 @@ struct TrackingNumbers {
     AdultMillimetres grown_at_once{80};  // or at once
     double worn_off = 0.004;    // share of the captured surface that is uncovered all together, from which on it is
     int worn_after = 60;        // added these many frames behind the last patch
-    int attempts_to_grow = 3;   // SurfacePatchOptions::attempts: what does not fit by then can wait
+    int attempts_where_open = 3;  // SurfacePatchOptions::attempts where surface comes and goes: what does not fit by
+                                  // then stays open
     int again_after = 6;        // frames after which that, or looking for limbs, is tried again where it was vain
     int forgotten_after = 150;  // frames for which a vertex was not seen: the next I-frame leaves it out
     double most_grown = 2.5;    // as most_renewed_vertices, where the reference grows with what is seen

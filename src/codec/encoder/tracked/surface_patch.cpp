@@ -242,29 +242,34 @@ std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& sh
                               const SurfacePatchOptions& options) {
     const auto& points = shown.positions;
     const auto& decoded = tracked.decoded;
-    std::vector<Point3f> samples(points), facing(shown.normals);
-    std::vector<std::uint32_t> near(tracked.near.begin(), tracked.near.end());
-    if (!near.empty())
-        for (const auto& t : decoded.triangles) near.push_back(near[t[0]]);
-    for (const auto& t : decoded.triangles) {
+    // Of vertices first, of triangles behind them: those that may be seen.
+    std::vector<std::size_t> sampled;
+    std::vector<Point3f> samples, facing;
+    std::vector<std::uint32_t> near;
+    const auto sample = [&](std::size_t of, const Point3f& point, const Point3f& normal, std::uint32_t vertex) {
+        sampled.push_back(of);
+        samples.push_back(point);
+        facing.push_back(normal);
+        if (!tracked.near.empty()) near.push_back(tracked.near[vertex]);
+    };
+    for (std::uint32_t v = 0; v < points.size(); ++v)
+        if (tracked.seen.empty() || tracked.seen[v] != 0) sample(v, points[v], shown.normals[v], v);
+    for (std::size_t i = 0; i < decoded.triangles.size(); ++i) {
+        const auto& t = decoded.triangles[i];
+        if (tracked.is_unseen(t)) continue;
         Vector3d middle{};
         for (const auto v : t) middle = middle + to_vector(decoded.positions[v]) * (1.0 / 3);
-        samples.push_back(to_floats(middle));
-        facing.push_back(to_floats(normal_of(decoded.positions, t)));
+        sample(points.size() + i, to_floats(middle), to_floats(normal_of(decoded.positions, t)), t[0]);
     }
     const auto found = closest_on_same_side(capture.surface, samples, facing,
                                             {options.reach, options.lost / 2, 0, options.threads}, std::move(near));
-    std::vector<double> error(samples.size());
+    std::vector<double> error(points.size() + decoded.triangles.size(), 0);
     parallel_for(samples.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const auto distance = distance_to(found[i], options.reach);
-            error[i] = distance > options.lost / 2 && capture.ends_at(samples[i]) ? 0 : distance.value;
+            if (distance <= options.lost / 2 || !capture.ends_at(samples[i])) error[sampled[i]] = distance.value;
         }
     });
-    for (std::size_t v = 0; v < tracked.seen.size(); ++v)
-        if (tracked.seen[v] == 0) error[v] = 0;
-    for (std::size_t t = 0; t < decoded.triangles.size(); ++t)
-        if (tracked.is_unseen(decoded.triangles[t])) error[points.size() + t] = 0;
     std::vector<double> out(points.size(), 0);
     for (std::size_t v = 0; v < out.size(); ++v) {
         const auto triangles = shown.around.of(v);

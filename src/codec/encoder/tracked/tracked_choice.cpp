@@ -96,7 +96,7 @@ bool may_be_renewed(const TrackedWork& work, const FrameSteps& steps, const Latt
 
 // ---- Patches --------------------------------------------------------------------------------------------------------
 
-SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& steps, FrameReason reason) {
+SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& steps) {
     const auto& configuration = work.configuration;
     const auto& scale = configuration.scale;
     SurfacePatchOptions out;
@@ -106,7 +106,7 @@ SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& ste
     out.reach = scale.on_lattice(numbers.reach);
     out.speck = scale.on_lattice(numbers.speck);
     out.most_share = configuration.options.tracked.patch_share;
-    if (reason == FrameReason::border) out.attempts = numbers.attempts_to_grow;
+    if (configuration.tells_presence()) out.attempts = numbers.attempts_where_open;
     out.simplification = simplification_options(configuration, steps);
     out.threads = configuration.threads;
     return out;
@@ -124,7 +124,7 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
     StageClock measuring(work.stages);
     const SurfacePatchSearch search(
         {tracked.mesh, reference.decoded.by_nodes->mesh.positions, tracked.near, tracked.seen}, work.captured.mesh,
-        work.surface, patch_options(work, steps, reason));
+        work.surface, patch_options(work, steps));
     measuring.done("patch");
     for (const auto region_lost : {lost, LatticeUnits(0)}) {
         if (region_lost.value == 0 && reason == FrameReason::border) break;  // nothing is lost
