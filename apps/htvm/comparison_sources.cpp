@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "command_line/terminal.h"
-#include "io/sequence.h"
 
 namespace htvm::app {
 namespace {
@@ -63,7 +62,7 @@ namespace {
 std::vector<std::int64_t> times_of(const MeshSource& source, const MeshSource& other) {
     if (!source.times_us.empty() || source.is_stream || !other.is_stream) return source.times_us;
     std::vector<std::int64_t> out;
-    for (const auto place : places_in_time({std::vector<std::filesystem::path>(source.frames), source.numbers}))
+    for (const auto place : places_beside(source, other.frames))
         out.push_back(std::llround(static_cast<double>(place) / other.rate.per_second() * 1e6));
     return out;
 }

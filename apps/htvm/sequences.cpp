@@ -254,12 +254,22 @@ std::vector<std::int64_t> times_at_rate_of(const MeshSource& original, std::span
     std::vector<std::int64_t> out;
     const auto interval = frame_interval(decoded);
     if (!interval) return out;
-    for (const auto place : places_in_time({std::vector<std::filesystem::path>(original.frames), original.numbers}))
+    for (const auto place : places_beside(original, decoded.size()))
         out.push_back(std::llround(static_cast<double>(place) * *interval));
     return out;
 }
 
 }  // namespace
+
+std::vector<std::uint64_t> places_beside(const MeshSource& original, std::size_t decoded_frames) {
+    const auto& numbers = original.numbers;
+    if (!numbers.empty() && original.frames < decoded_frames && numbers.back() - numbers.front() < decoded_frames) {
+        std::vector<std::uint64_t> out;
+        for (const auto number : numbers) out.push_back(number - numbers.front());
+        return out;
+    }
+    return places_in_time({std::vector<std::filesystem::path>(original.frames), numbers});
+}
 
 std::vector<FramePair> pair_files(const MeshSource& original, const MeshSource& decoded) {
     auto by_number = pair_by_number(original.numbers, decoded.numbers);

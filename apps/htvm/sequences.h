@@ -70,6 +70,11 @@ std::vector<FramePair> pair_by_number(std::span<const std::uint64_t> original, s
 // Times ascend on both sides, in microseconds: frames within half a millisecond of each other are pairs.
 std::vector<FramePair> pair_by_time(std::span<const std::int64_t> original, std::span<const std::int64_t> decoded);
 
+// The frames that originals are, from 0, by the numbers in their names, beside so many decoded ones. Where more were
+// decoded, and as many as the numbers tell, the originals are some of those that were encoded, and each number is a
+// frame; else as places_in_time() has it, of every tenth file as well.
+std::vector<std::uint64_t> places_beside(const MeshSource& original, std::size_t decoded_frames);
+
 // Pairs files on both sides: by time where both tell it, or where the decoded ones do, as htvm decode writes and
 // numbers them, and are regular: then the originals' numbers give theirs, at the shortest interval of the decoded ones.
 // By number where that pairs more.

@@ -99,6 +99,19 @@ TEST(FramePairs, OfFilesWithoutTimesGoByTheRateOfTheDecodedOnes) {
     EXPECT_EQ(pairs_of_files(files(6), every_other), (Pairs{{0, 0}, {2, 1}, {4, 2}})) << "the originals' own numbers";
 }
 
+TEST(FramePairs, SomeOfTheOriginalsGoByTheirNumbers) {
+    auto every_third = files(3);
+    every_third.numbers = {0, 3, 6};
+    EXPECT_EQ(pairs_of_files(every_third, files(7, {0, 40000, 80000, 120000, 160000, 200000, 240000})),
+              (Pairs{{0, 0}, {1, 3}, {2, 6}}))
+        << "all were encoded";
+    EXPECT_EQ(pairs_of_files(every_third, files(3, {0, 40000, 80000})), (Pairs{{0, 0}, {1, 1}, {2, 2}}))
+        << "these were encoded";
+    EXPECT_EQ(places_beside(every_third, 7), (Numbers{0, 3, 6})) << "of a stream";
+    EXPECT_EQ(places_beside(every_third, 3), (Numbers{0, 1, 2}));
+    EXPECT_EQ(places_beside(every_third, 6), (Numbers{0, 1, 2})) << "fewer than the last number tells";
+}
+
 TEST(FramePairs, MayBeOutOfStepWhereDecodedFilesTellNoTimes) {
     EXPECT_TRUE(may_be_out_of_step(files(6), files(5)));
     EXPECT_FALSE(may_be_out_of_step(files(5), files(5)));

@@ -336,6 +336,33 @@ TEST(Charts, AVertexOfTwoPairsOfCoordinatesIsRepeatedBehindTheMesh) {
     EXPECT_EQ(shown.colours[5], mesh.colours[2]);
 }
 
+TEST(Charts, DetailLiesInTheMiddleOfItsEdgesInEachChart) {
+    auto mesh = square(10);
+    const CornerTexcoords first = {{{0, 0}, {10, 0}, {10, 10}}}, second = {{{100, 0}, {110, 10}, {100, 10}}};
+    // The diagonal, which is a seam, is cut, and one side of the first triangle.
+    const auto edges = find_edges(4, mesh.triangles);
+    std::vector<std::uint8_t> split;
+    for (const auto& ends : edges.ends)
+        split.push_back(ends == std::array{0u, 2u} || ends == std::array{0u, 1u} ? 1 : 0);
+    SurfaceDetail detail;
+    detail.levels.push_back(*split_edges(places_of(mesh.positions), mesh.triangles, edges, split, 100));
+    detail.rules.emplace_back();
+    detail.displacements.assign(2, 0);
+    const auto textured = textured_surface(4, mesh.triangles, {first, second}, detail, 1);
+    ASSERT_TRUE(textured);
+    // On the diagonal one vertex has two places, the ends' middles in either triangle.
+    const auto on_side = detail.levels[0].stencils[0].b == 1 ? 4u : 5u, on_diagonal = 9 - on_side;
+    EXPECT_EQ(textured->texcoords[on_side], (QuantisedTexcoord{5, 0}));
+    EXPECT_EQ(textured->texcoords[on_diagonal], (QuantisedTexcoord{5, 5}));
+    EXPECT_EQ(textured->triangles.size(), 5u);
+    ASSERT_EQ(textured->copied.size(), 3u);
+    const auto copy = std::find(textured->copied.begin(), textured->copied.end(), on_diagonal);
+    ASSERT_NE(copy, textured->copied.end());
+    EXPECT_EQ(textured->texcoords[6 + static_cast<std::size_t>(copy - textured->copied.begin())],
+              (QuantisedTexcoord{105, 5}));
+    EXPECT_EQ(shown_mesh(detailed(detail, mesh), *textured).positions.size(), 9u);
+}
+
 TEST(Charts, AVertexInTooManyChartsIsAnError) {
     std::vector<Triangle> triangles;
     std::vector<CornerTexcoords> corners;

@@ -368,15 +368,29 @@ void write_presence() {
     write_packets("presence", with_presence(encode(meshes, options).packets, 1500, motion, 7));
 }
 
-// I-frames with levels as the encoder writes them, and T- and TP-frames that are shown with detail.
-void write_levels() {
-    auto options = patched_options();
+// A person whose elbow folds, so that a part is patched; large enough for levels to pay.
+CodedSequence person_in_levels(const StreamTexture& texture) {
+    auto person = walking(3, 6000, 50);
+    for (auto& frame : person.frames) frame.mesh.texcoords.clear();
+    auto options = default_options(Profile::tracked);
     options.tracked.levels = ReferenceLevels::on;
-    const auto coded = encode(horned_ball(6), options);
-    ASSERT_TRUE(coded.errors.empty()) << coded.errors[0];
-    ASSERT_GE(frames_of(coded, FrameType::patched), 1u);
-    ASSERT_EQ(read_frame_payload(coded.packets[1].payload)->header.intra_coder, intra_coder_levels);
-    write_packets("levels", coded.packets);
+    options.texture = texture;
+    auto coded = encode(person, options);
+    EXPECT_TRUE(coded.errors.empty()) << coded.errors[0];
+    EXPECT_GE(frames_of(coded, FrameType::patched), 1u);
+    EXPECT_EQ(read_frame_payload(coded.packets[1].payload)->header.intra_coder, intra_coder_levels);
+    return coded;
+}
+
+// I-frames with levels as the encoder writes them, and T- and TP-frames that are shown with detail.
+void write_levels() { write_packets("levels", person_in_levels({}).packets); }
+
+// The same with charts, in which the detail lies on the reference's triangles; and a patch, behind which a part of it
+// stays.
+void write_leveled_charts() {
+    const auto coded = person_in_levels({TextureLayout::charts, 768, 512});
+    ASSERT_TRUE(read_frame_payload(coded.packets[1].payload)->has(Layer::charts));
+    write_packets("leveled_charts", coded.packets);
 }
 
 // I-frames with any levels of any mesh, and behind each what may follow it: T-, TP- and P-frames and groups, of which
@@ -424,6 +438,7 @@ void write_levels_by_chance() {
 void write_all() {
     fs::create_directories(folder);
     write_levels();
+    write_leveled_charts();
     write_levels_by_chance();
     write_audio_between();
     write_corner_cases();

@@ -132,6 +132,75 @@ TEST(LeveledStreams, KeepTheDetailOfWhatAPatchLeaves) {
         EXPECT_EQ(all[t].mesh.positions, coded.reconstructions[t].positions) << "frame " << t;
 }
 
+// ---- With charts ----------------------------------------------------------------------------------------------------
+
+const CodedSequence& patched_with_charts() {
+    static const auto coded = [] {
+        auto options = tracked(ReferenceLevels::on);
+        options.texture = {TextureLayout::charts, 512, 512};
+        return encode(walking(3, 12000), options);
+    }();
+    return coded;
+}
+
+// Of all triangles, in the picture.
+double picture_area(const Mesh& mesh) {
+    double sum = 0;
+    for (const auto& [a, b, c] : mesh.triangles) {
+        const auto &p = mesh.texcoords[a], &q = mesh.texcoords[b], &r = mesh.texcoords[c];
+        sum += (q[0] - p[0]) * (r[1] - p[1]) - (r[0] - p[0]) * (q[1] - p[1]);
+    }
+    return sum / 2;
+}
+
+TEST(LeveledStreams, WithChartsAreShownAsTheEncoderHasThem) {
+    const auto& coded = patched_with_charts();
+    ASSERT_GT(coded.infos[0].bytes[Layer::levels], 0u);
+    ASSERT_GT(coded.infos[0].bytes[Layer::charts], 0u);
+    EXPECT_TRUE(std::any_of(coded.infos.begin(), coded.infos.end(),
+                            [](const FrameInfo& info) { return info.type == FrameType::patched; }));
+    const auto frames = decoded(coded, DecoderOptions{}.detail_levels);
+    ASSERT_EQ(frames.size(), coded.reconstructions.size());
+    for (std::size_t t = 0; t < frames.size(); ++t) {
+        const auto &mesh = frames[t].mesh, &shown = coded.reconstructions[t];
+        ASSERT_EQ(mesh.texcoords.size(), mesh.positions.size());
+        EXPECT_EQ(mesh.positions, shown.positions) << "frame " << t;
+        EXPECT_EQ(mesh.triangles, shown.triangles) << "frame " << t;
+        EXPECT_EQ(mesh.texcoords, shown.texcoords) << "frame " << t;
+    }
+}
+
+TEST(LeveledStreams, CoverTheSamePartOfThePictureWithAnyLevels) {
+    const auto all = decoded(patched_with_charts(), DecoderOptions{}.detail_levels);
+    for (const std::uint32_t levels : {0u, 1u}) {
+        const auto fewer = decoded(patched_with_charts(), levels);
+        ASSERT_EQ(fewer.size(), all.size());
+        for (std::size_t t = 0; t < all.size(); ++t) {
+            EXPECT_LT(fewer[t].mesh.triangles.size(), all[t].mesh.triangles.size());
+            ASSERT_EQ(fewer[t].mesh.texcoords.size(), fewer[t].mesh.positions.size());
+            EXPECT_GT(picture_area(all[t].mesh), 0.1);
+            EXPECT_NEAR(picture_area(fewer[t].mesh), picture_area(all[t].mesh), 1e-4) << "frame " << t;
+        }
+    }
+}
+
+TEST(LeveledStreams, ThatShowOtherLevelsFromAFrameOnHaveTheirTextureCoordinates) {
+    const auto all = decoded(patched_with_charts(), DecoderOptions{}.detail_levels),
+               none = decoded(patched_with_charts(), 0);
+    Decoder decoder;
+    std::size_t t = 0;
+    for (const auto& packet : patched_with_charts().packets) {
+        const auto frame = decoder.decode_copy(packet);
+        ASSERT_TRUE(frame);
+        if (!*frame) continue;
+        const auto& expected = (t == 1 ? none : all)[t];
+        EXPECT_EQ((*frame)->mesh.texcoords, expected.mesh.texcoords) << "frame " << t;
+        EXPECT_EQ((*frame)->mesh.triangles, expected.mesh.triangles) << "frame " << t;
+        decoder.set_detail_levels(++t == 1 ? 0 : DecoderOptions{}.detail_levels);
+    }
+    EXPECT_EQ(t, 3u);
+}
+
 TEST(LeveledStreams, LeaveCapturesAloneThatKeepTheirVertices) {
     auto options = tracked(ReferenceLevels::on);
     options.tracked.simplify = 0;

@@ -112,9 +112,33 @@ def decode_corners(layer, picture, positions, triangles):
     return [tuple(corners[i : i + 3]) for i in range(0, len(corners), 3)]
 
 
+def corners_of_level(level, triangles, corners):
+    """The pairs of a level's triangles, from those of the triangles before it (6.9)."""
+    out = []
+    for triangle, parent in zip(level.triangles, level.parents):
+        if triangle == triangles[parent]:
+            out.append(corners[parent])
+            continue
+        at = dict(zip(triangles[parent], corners[parent]))
+        pairs = []
+        for v in triangle:
+            if v >= level.first:
+                s = level.stencils[v - level.first]
+                pairs.append(tuple((x + y) // 2 for x, y in zip(at[s.a], at[s.b])))
+            else:
+                pairs.append(at[v])
+        out.append(tuple(pairs))
+    return out
+
+
 class TexturedSurface:
-    def __init__(self, vertices, triangles, corners):
+    """corners: of each triangle of the reference. detail: with which it is shown, or None."""
+
+    def __init__(self, vertices, triangles, corners, detail=None):
         self.corners, self.copied, self.triangles = corners, [], []
+        for level in detail.levels if detail else ():
+            corners, triangles = corners_of_level(level, triangles, corners), level.triangles
+            vertices += len(level.stencils)
         self.texcoords = [(0, 0)] * vertices
         number = {}  # of a vertex with these coordinates
         pairs = [0] * vertices

@@ -39,7 +39,7 @@ def digest(mesh):
     return crc
 
 
-def textured_surface(header, frame, mesh, before=()):
+def textured_surface(header, frame, mesh, detail, before=()):
     """How the mesh is shown in a stream with charts (6.8), or None. before: coordinates that a TP-frame keeps."""
     if header.layout != 2 or (not before and CHARTS not in frame.layers):
         return None
@@ -47,7 +47,7 @@ def textured_surface(header, frame, mesh, before=()):
     corners, triangles = list(before), mesh.triangles[len(before):]
     if triangles:
         corners += decode_corners(frame.layer(CHARTS), header.picture, mesh.positions, triangles)
-    return TexturedSurface(len(mesh.positions), mesh.triangles, corners) if corners else None
+    return TexturedSurface(len(mesh.positions), mesh.triangles, corners, detail) if corners else None
 
 
 def intra_presence(header, packet, frame, mesh):
@@ -134,13 +134,13 @@ class Group:
         frame = read_coded_frame(packet)
         joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
         mesh, presence, stay, kept = decode_patched_mesh(frame, self.tracked_reference(header))
+        detail = detail_that_stays(self.detail, len(self.mesh.positions), stay, mesh)
         textured = None
         if self.textured:
             stays = set(stay)
             before = [corners for triangle, corners in zip(self.mesh.triangles, self.textured.corners)
                       if stays.issuperset(triangle)]
-            textured = textured_surface(header, frame, mesh, before)
-        detail = detail_that_stays(self.detail, len(self.mesh.positions), stay, mesh)
+            textured = textured_surface(header, frame, mesh, detail, before)
         group = Group(mesh, frame, packet.frame, kept=kept, textured=textured, presence=presence, detail=detail)
         return mesh, joints, group
 
@@ -180,8 +180,7 @@ def decode_stream(data):
                     if not packet.of_tracked_mesh():
                         mesh.positions = smoothed(mesh.positions, mesh.triangles, step, at_seams=bool(mesh.texcoords))
                     step = 1
-                textured = textured_surface(header, frame, mesh)
-                check(not detail or not textured, "it has detail and charts")
+                textured = textured_surface(header, frame, mesh, detail)
                 presence = intra_presence(header, packet, frame, mesh)
                 own = Group(mesh, frame, packet.frame, step, textured=textured, presence=presence, detail=detail)
                 if packet.referred():

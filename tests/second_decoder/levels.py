@@ -116,7 +116,8 @@ def along_border(edges, borders, v, e):
 
 
 class Level:
-    """first: the number of its first vertex. stencils, beside: of each of them. triangles: behind it."""
+    """first: the number of its first vertex. stencils, beside: of each of them. triangles: behind it; parents: of each,
+    which one it was cut from."""
 
 
 def cut(t, corners, sides, vertex, Q, ends):
@@ -165,10 +166,11 @@ def split_edges(Q, triangles, edges, split):
     level.stencils = [Stencil(triangles, edges, borders, e) for e in split]
     level.beside = [[vertex[u] for t in edges.triangles[e][:2] for u in edges.of_triangle[t] if u < e and u in vertex]
                     for e in split]
-    level.triangles, sides = [], []
+    level.triangles, level.parents, sides = [], [], []
     for t, corners in enumerate(triangles):
         for part, its_sides in cut(t, corners, edges.of_triangle[t], vertex, Q, edges.ends):
             level.triangles.append(part)
+            level.parents.append(t)
             sides.append(its_sides)
     return level, Edges(level.triangles, sides)
 

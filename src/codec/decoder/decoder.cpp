@@ -73,11 +73,32 @@ void show_part(ShownFrame& shown, const TexturedSurface* textured, std::span<con
     shown.triangles = shown.own_triangles;
 }
 
+// A mesh with charts as it is shown with fewer levels of detail than it has; made when these or the mesh are others.
+const TexturedSurface* with_fewer_levels(ShownFrame& shown, const LatticeMeshView& mesh, std::size_t levels,
+                                         std::uint32_t reference_topology) {
+    if (shown.coarser_topology != reference_topology || shown.coarser_levels != levels) {
+        shown.coarser_topology = 0;
+        // With all levels there was no error, so there is none now.
+        shown.coarser =
+            textured_surface(mesh.positions.size(), mesh.triangles, mesh.textured->corners, *mesh.detail, levels)
+                .value_or(TexturedSurface());
+        shown.coarser_topology = reference_topology;
+        shown.coarser_levels = levels;
+        shown.texcoords_topology = 0;
+    }
+    return &shown.coarser;
+}
+
 // The mesh as it is shown: with the detail that is asked for, where it has any.
-LatticeMeshView with_detail(DecoderState& state, const LatticeMeshView& mesh) {
-    if (!mesh.detail || mesh.detail->empty() || state.options.detail_levels == 0) return mesh;
+LatticeMeshView with_detail(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t reference_topology) {
+    if (!mesh.detail || mesh.detail->empty()) return mesh;
     const auto& detail = *mesh.detail;
     const auto levels = std::min<std::size_t>(state.options.detail_levels, detail.levels.size());
+    const bool has_charts = mesh.textured && !mesh.textured->empty();
+    auto out = mesh;
+    if (has_charts && levels < detail.levels.size())
+        out.textured = with_fewer_levels(state.shown, mesh, levels, reference_topology);
+    if (levels == 0) return out;
     auto& fine = state.shown.fine;
     auto& presence = state.shown.fine_presence;
     fine.positions.assign(mesh.positions.begin(), mesh.positions.end());
@@ -88,7 +109,6 @@ LatticeMeshView with_detail(DecoderState& state, const LatticeMeshView& mesh) {
     add_detail(detail, levels, fine.colours);
     add_detail(detail, levels, fine.normals);
     add_detail(detail, levels, presence);
-    auto out = mesh;
     out.positions = fine.positions;
     out.triangles = detail.triangles(levels);
     out.colours = fine.colours;
@@ -100,7 +120,7 @@ LatticeMeshView with_detail(DecoderState& state, const LatticeMeshView& mesh) {
 }  // namespace
 
 void show(DecoderState& state, const LatticeMeshView& coded, std::uint32_t reference_topology, Pose pose) {
-    const auto mesh = with_detail(state, coded);
+    const auto mesh = with_detail(state, coded, reference_topology);
     const auto& lattice = state.header->lattice;
     const auto* textured = mesh.textured && !mesh.textured->empty() ? mesh.textured : nullptr;
     const auto presence = anything_absent(mesh.presence) ? mesh.presence : std::span<const std::uint8_t>();
@@ -134,7 +154,7 @@ void show(DecoderState& state, const LatticeMeshView& coded, std::uint32_t refer
 }
 
 Result<TexturedSurface> read_charts(const DecoderState& state, const FramePayloadView& payload, const LatticeMesh& mesh,
-                                    std::vector<CornerTexcoords> before) {
+                                    const SurfaceDetail& detail, std::vector<CornerTexcoords> before) {
     const auto& picture = state.header->texture;
     if (picture.layout != TextureLayout::charts || (before.empty() && !payload.has(Layer::charts)))
         return TexturedSurface();
@@ -148,7 +168,7 @@ Result<TexturedSurface> read_charts(const DecoderState& state, const FramePayloa
         if (!corners) return tl::unexpected(corners.error());
         before.insert(before.end(), corners->begin(), corners->end());
     }
-    auto out = textured_surface(mesh.positions.size(), mesh.triangles, std::move(before));
+    auto out = textured_surface(mesh.positions.size(), mesh.triangles, std::move(before), detail, detail.levels.size());
     if (!out) return out;
     if (out->texcoords.size() > state.options.max_vertices)
         return fail(ErrorKind::limit, "with those repeated at its charts' seams, the frame has " +

@@ -58,7 +58,10 @@ struct ShownFrame {
     Presence presence;                    // one per vertex; none: all are there
     LatticeMesh fine;                     // what is shown of a mesh with detail; its triangles are the detail's
     Presence fine_presence;
-    LatticeMesh own;  // the mesh of a frame that shares nothing with its reference
+    TexturedSurface coarser;             // with fewer levels of detail than there are: how that is shown
+    std::uint32_t coarser_topology = 0;  // reference_topology that it is of, with
+    std::size_t coarser_levels = 0;      // so many levels
+    LatticeMesh own;                     // the mesh of a frame that shares nothing with its reference
     Pose pose;
 };
 
@@ -137,10 +140,10 @@ inline std::uint32_t new_topology(DecoderState& state) {
 // std::bad_alloc; then nothing is shown.
 void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t reference_topology, Pose pose);
 
-// The mesh with the charts of the frame's layer; nothing if the stream or an I-frame has none. before: the coordinates
-// of the first triangles, which a TP-frame keeps.
+// The mesh, with its detail, and the charts of the frame's layer; nothing if the stream or an I-frame has none. before:
+// the coordinates of the first triangles, which a TP-frame keeps.
 Result<TexturedSurface> read_charts(const DecoderState& state, const FramePayloadView& payload, const LatticeMesh& mesh,
-                                    std::vector<CornerTexcoords> before = {});
+                                    const SurfaceDetail& detail, std::vector<CornerTexcoords> before = {});
 
 // An error if the packet does not refer to the current I-frame.
 Result<void> check_reference(const DecoderState& state, const Packet& packet);

@@ -54,9 +54,9 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     auto decoded = decode_mesh(state, packet, payload);
     if (!decoded) return tl::unexpected(decoded.error());
     auto& [mesh, detail, step] = *decoded;
-    auto textured = read_charts(state, payload, mesh);
+    auto textured = read_charts(state, payload, mesh, detail);
     if (!textured) return tl::unexpected(textured.error());
-    if (!detail.empty() && (!textured->empty() || !mesh.texcoords.empty()))
+    if (!detail.empty() && !mesh.texcoords.empty())
         return fail(ErrorKind::corrupt_stream, "I-frame: a mesh with detail that has texture coordinates");
     Presence presence;
     if (referred && header.version >= presence_version && payload.has(Layer::presence)) {

@@ -34,22 +34,22 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     // With what the patch added, the mesh may be larger than its header says, and than its reference.
     if (auto ok = check_limits({}, {mesh.positions.size(), mesh.triangles.size()}, {}, 0, state.options); !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
+    auto detail = detail_that_stays(state.reference->detail, reference.mesh.positions.size(), patched->stays, mesh);
     const auto& before = state.reference->textured;
     auto textured = before.empty() ? Result<TexturedSurface>()
-                                   : read_charts(state, payload, mesh,
+                                   : read_charts(state, payload, mesh, detail,
                                                  corners_that_stay(before.corners, triangles,
                                                                    reference.mesh.positions.size(), patched->stays));
     if (!textured) return tl::unexpected(textured.error());
     Presence presence;
     if (reference.has_presence)
         presence = presence_of_patched(tracked.state.presence, patched->stays, mesh.positions.size());
-    ReferenceFacts facts{
-        .number = packet.frame,
-        .captured = {payload.header.source_vertices, payload.header.source_triangles},
-        .kept = keep_nodes(reference.nodes, patched->stays),
-        .textured = std::move(*textured),
-        .presence = std::move(presence),
-        .detail = detail_that_stays(state.reference->detail, reference.mesh.positions.size(), patched->stays, mesh)};
+    ReferenceFacts facts{.number = packet.frame,
+                         .captured = {payload.header.source_vertices, payload.header.source_triangles},
+                         .kept = keep_nodes(reference.nodes, patched->stays),
+                         .textured = std::move(*textured),
+                         .presence = std::move(presence),
+                         .detail = std::move(detail)};
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     // Its nodes are for the next frame to derive, or for the time between, so that no frame has to do the work of two.

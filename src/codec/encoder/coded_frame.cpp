@@ -23,11 +23,7 @@ ShownMesh shown(CodedFrame& frame, const Reference* reference) {
     const bool own = rules_of(frame.type).codes_mesh || !reference;
     const auto& textured = own ? frame.textured : reference->textured;
     const auto& detail = detail_of(frame, reference);
-    ShownMesh out;
-    if (textured.empty())
-        out.mesh = detailed(detail, std::move(frame.decoded));
-    else
-        out = {shown_mesh(frame.decoded, textured), textured.copied};
+    ShownMesh out{shown_mesh(detailed(detail, std::move(frame.decoded)), textured), textured.copied};
     if (!anything_absent(frame.presence)) return out;
     auto presence = frame.presence;
     add_detail(detail, detail.levels.size(), presence);

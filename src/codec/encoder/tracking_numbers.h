@@ -25,6 +25,9 @@ struct TrackingNumbers {
     // Where simplification keeps more of the captured vertices than that, levels are not tried: what is left to say is
     // the capture's own triangles (docs/experiments/hierarchy.md).
     double levels_most_kept = 0.72;
+    // How much more a reference in levels must save that has charts, as a logarithm of the price: on its coarser
+    // triangles pictures take more bits (docs/experiments/hierarchy.md).
+    double levels_margin_with_charts = 0.15;
     double levels_step = 0.85;  // step of an I-frame's finest displacements, where it has levels, in steps of positions
     std::uint32_t referred_level = 1;  // the level that T-frames refer to
     double finer_renewed = 0.5;  // step of an I-frame made of the tracked mesh, in steps of one made of the capture:
@@ -65,13 +68,13 @@ struct TrackingNumbers {
     AdultMillimetres grown_from{20};     // side of a square as large as what is uncovered in a region, from which on it
     int grown_after = 6;                 // is added, these many frames behind the last patch,
     AdultMillimetres grown_at_once{80};  // or at once
-    double worn_off = 0.004;    // share of the captured surface that is uncovered all together, from which on it is
-    int worn_after = 60;        // added these many frames behind the last patch
+    double worn_off = 0.004;      // share of the captured surface that is uncovered all together, from which on it is
+    int worn_after = 60;          // added these many frames behind the last patch
     int attempts_where_open = 3;  // SurfacePatchOptions::attempts where surface comes and goes: what does not fit by
                                   // then stays open
-    int again_after = 6;        // frames after which that, or looking for limbs, is tried again where it was vain
-    int forgotten_after = 150;  // frames for which a vertex was not seen: the next I-frame leaves it out
-    double most_grown = 2.5;    // as most_renewed_vertices, where the reference grows with what is seen
+    int again_after = 6;          // frames after which that, or looking for limbs, is tried again where it was vain
+    int forgotten_after = 150;    // frames for which a vertex was not seen: the next I-frame leaves it out
+    double most_grown = 2.5;      // as most_renewed_vertices, where the reference grows with what is seen
 
     // ---- When an I-frame is sent
     double most_others = 0.1;  // share of the vertices that have other texture coordinates: the atlas is laid out anew

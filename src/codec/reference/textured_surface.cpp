@@ -5,10 +5,44 @@
 
 namespace htvm::internal {
 
-Result<TexturedSurface> textured_surface(std::size_t vertices, std::span<const Triangle> triangles,
-                                         std::vector<CornerTexcoords> corners) {
+namespace {
+
+QuantisedTexcoord middle_of(const QuantisedTexcoord& a, const QuantisedTexcoord& b) {
+    return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2};
+}
+
+// The coordinates of a level's triangles, which lie on those that they were cut from. before, triangles: of these.
+std::vector<CornerTexcoords> corners_of_level(const SubdivisionLevel& level, std::span<const Triangle> triangles,
+                                              std::span<const CornerTexcoords> before) {
+    std::vector<CornerTexcoords> out(level.triangles.size());
+    for (std::size_t t = 0; t < out.size(); ++t) {
+        const auto& whole = triangles[level.parent[t]];
+        const auto& of_whole = before[level.parent[t]];
+        const auto at = [&](std::uint32_t vertex) {
+            return of_whole[vertex == whole[0] ? 0 : vertex == whole[1] ? 1 : 2];
+        };
+        // One that is degenerate stays as it is, with coordinates for each time that it names a vertex.
+        if (level.triangles[t] == whole) {
+            out[t] = of_whole;
+            continue;
+        }
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto v = level.triangles[t][i];
+            if (v < level.first) {
+                out[t][i] = at(v);
+                continue;
+            }
+            const auto& edge = level.stencils[v - level.first];
+            out[t][i] = middle_of(at(edge.a), at(edge.b));
+        }
+    }
+    return out;
+}
+
+// What is shown of these triangles, whose corners lie there in the picture.
+Result<TexturedSurface> with_copies(std::size_t vertices, std::span<const Triangle> triangles,
+                                    std::span<const CornerTexcoords> corners) {
     TexturedSurface out;
-    out.corners = std::move(corners);
     out.texcoords.resize(vertices);
     std::vector<std::uint8_t> pairs(vertices, 0);
     bool too_many = false;
@@ -39,11 +73,33 @@ Result<TexturedSurface> textured_surface(std::size_t vertices, std::span<const T
     out.triangles.reserve(triangles.size());
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         const auto& [a, b, c] = triangles[t];
-        const auto first = with(a, out.corners[t][0]);
-        const auto second = with(b, out.corners[t][1]);
-        out.triangles.push_back({first, second, with(c, out.corners[t][2])});
+        const auto first = with(a, corners[t][0]);
+        const auto second = with(b, corners[t][1]);
+        out.triangles.push_back({first, second, with(c, corners[t][2])});
     }
     if (too_many) return fail(ErrorKind::corrupt_stream, "charts: a vertex lies in too many of them");
+    return out;
+}
+
+}  // namespace
+
+Result<TexturedSurface> textured_surface(std::size_t vertices, std::span<const Triangle> triangles,
+                                         std::vector<CornerTexcoords> corners) {
+    return textured_surface(vertices, triangles, std::move(corners), {}, 0);
+}
+
+Result<TexturedSurface> textured_surface(std::size_t vertices, std::span<const Triangle> triangles,
+                                         std::vector<CornerTexcoords> corners, const SurfaceDetail& detail,
+                                         std::size_t shown) {
+    std::vector<CornerTexcoords> fine;
+    for (std::size_t k = 0; k < shown; ++k) {
+        const auto& level = detail.levels[k];
+        fine = corners_of_level(level, k == 0 ? triangles : detail.triangles(k), k == 0 ? corners : fine);
+        vertices += level.stencils.size();
+    }
+    auto out =
+        shown == 0 ? with_copies(vertices, triangles, corners) : with_copies(vertices, detail.triangles(shown), fine);
+    if (out) out->corners = std::move(corners);
     return out;
 }
 
@@ -60,17 +116,19 @@ std::vector<CornerTexcoords> corners_that_stay(std::span<const CornerTexcoords> 
     return out;
 }
 
-LatticeMesh shown_mesh(const LatticeMesh& mesh, const TexturedSurface& textured) {
+LatticeMesh shown_mesh(LatticeMesh mesh, const TexturedSurface& textured) {
     if (textured.empty()) return mesh;
-    LatticeMesh out = mesh;
-    out.triangles = textured.triangles;
-    out.texcoords = textured.texcoords;
-    for (const auto v : textured.copied) {
-        out.positions.push_back(mesh.positions[v]);
-        if (!mesh.colours.empty()) out.colours.push_back(mesh.colours[v]);
-        if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[v]);
-    }
-    return out;
+    mesh.triangles = textured.triangles;
+    mesh.texcoords = textured.texcoords;
+    const auto repeat = [&](auto& values) {
+        if (values.empty()) return;
+        values.reserve(values.size() + textured.copied.size());
+        for (const auto v : textured.copied) values.push_back(values[v]);
+    };
+    repeat(mesh.positions);
+    repeat(mesh.colours);
+    repeat(mesh.normals);
+    return mesh;
 }
 
 }  // namespace htvm::internal

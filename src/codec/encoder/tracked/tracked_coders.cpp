@@ -40,21 +40,22 @@ struct Charts {
     std::uint32_t scale = 0;
 };
 
-Result<Charts> add_charts(const LatticeMesh& mesh, const SurfaceIndex& captured, const StreamTexture& texture,
-                          FramePayload& payload) {
+Result<Charts> add_charts(const LatticeMesh& mesh, const SurfaceDetail& detail, const SurfaceIndex& captured,
+                          const StreamTexture& texture, FramePayload& payload) {
     if (texture.layout != TextureLayout::charts || mesh.triangles.empty()) return Charts();
     auto placed = lay_out(mesh.positions, mesh.triangles, texture, captured_detail(mesh.positions, captured));
     if (!placed) return tl::unexpected(placed.error());
     payload.set(Layer::charts, std::move(placed->layer));
-    auto textured = textured_surface(mesh.positions.size(), mesh.triangles, std::move(placed->corners));
+    auto textured = textured_surface(mesh.positions.size(), mesh.triangles, std::move(placed->corners), detail,
+                                     detail.levels.size());
     if (!textured) return tl::unexpected(textured.error());
     return Charts{std::move(*textured), placed->scale};
 }
 
 // The patched mesh with the charts of what stays and new ones for the piece; nothing if the picture has no room.
-std::optional<TexturedSurface> add_charts_of_piece(const PatchedSurface& patched, const Reference& before,
-                                                   const StreamTexture& texture, std::uint32_t scale,
-                                                   FramePayload& payload) {
+std::optional<TexturedSurface> add_charts_of_piece(const PatchedSurface& patched, const SurfaceDetail& detail,
+                                                   const Reference& before, const StreamTexture& texture,
+                                                   std::uint32_t scale, FramePayload& payload) {
     if (before.textured.empty()) return TexturedSurface();
     const auto& mesh = patched.mesh;
     auto corners = corners_that_stay(before.textured.corners, before.mesh().triangles, before.mesh().positions.size(),
@@ -66,7 +67,8 @@ std::optional<TexturedSurface> add_charts_of_piece(const PatchedSurface& patched
         payload.set(Layer::charts, std::move(placed->layer));
         corners.insert(corners.end(), placed->corners.begin(), placed->corners.end());
     }
-    auto textured = textured_surface(mesh.positions.size(), mesh.triangles, std::move(corners));
+    auto textured =
+        textured_surface(mesh.positions.size(), mesh.triangles, std::move(corners), detail, detail.levels.size());
     return textured ? std::optional(std::move(*textured)) : std::nullopt;
 }
 
@@ -94,7 +96,7 @@ Result<TrackedIntra> sent_as(const TrackedWork& work, CodedIntra coded, Presence
                              const FrameSteps& steps, FrameReason reason) {
     const auto& configuration = work.configuration;
     StageClock clock(work.stages);
-    auto charts = add_charts(coded.decoded, work.surface, configuration.options.texture, coded.payload);
+    auto charts = add_charts(coded.decoded, coded.detail, work.surface, configuration.options.texture, coded.payload);
     if (!charts) return tl::unexpected(charts.error());
     TrackedIntra out;
     out.step = coded.step;
@@ -206,7 +208,7 @@ bool codes_levels(const TrackedWork& work, const LatticeMesh& simple) {
     const auto wanted = options.tracked.levels;
     if (wanted == ReferenceLevels::off || (wanted == ReferenceLevels::automatic && !work.effort.levels)) return false;
     return !options.intra_coder && (!configuration.tells_presence() || wanted == ReferenceLevels::on) &&
-           options.texture.layout == TextureLayout::none && !simple.positions.empty() && mesh.texcoords.empty() &&
+           options.texture.layout != TextureLayout::captured && !simple.positions.empty() && mesh.texcoords.empty() &&
            !configuration.intra_only() &&
            static_cast<double>(simple.positions.size()) <=
                tracking_numbers.levels_most_kept * static_cast<double>(mesh.positions.size());
@@ -231,7 +233,10 @@ Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameS
     if (codes_levels(work, simple)) {
         auto leveled = code_levels(work, steps, reason);
         if (!leveled) return tl::unexpected(leveled.error());
-        if (*leveled && price_of(work, (*leveled)->frame) < price_of(work, chosen.frame)) chosen = std::move(**leveled);
+        const bool asked = work.configuration.options.tracked.levels == ReferenceLevels::on;
+        const double margin = asked || chosen.frame.textured.empty() ? 0 : tracking_numbers.levels_margin_with_charts;
+        if (*leveled && price_of(work, (*leveled)->frame) + margin < price_of(work, chosen.frame))
+            chosen = std::move(**leveled);
     }
     prepare_reference(work, chosen);
     return flat;
@@ -426,7 +431,8 @@ Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const No
     payload.set(Layer::tracked, tracked.runs.payload);
     payload.set(Layer::pose, encode_pose(work.captured.pose));
     smooth_what_is_new(*patched, quantised.geometry, !mesh.normals.empty());
-    auto textured = add_charts_of_piece(*patched, reference.decoded, work.configuration.options.texture,
+    auto detail = detail_that_stays(reference.decoded.detail, mesh.positions.size(), patched->stays, patched->mesh);
+    auto textured = add_charts_of_piece(*patched, detail, reference.decoded, work.configuration.options.texture,
                                         reference.origin.chart_scale, payload);
     if (!textured) return std::optional<TrackedPatch>();
     TrackedPatch out;
@@ -438,7 +444,7 @@ Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const No
     frame.renewed =
         vertices > 0 ? static_cast<double>(vertices - patched->stays.size()) / static_cast<double>(vertices) : 0;
     frame.decoded = std::move(patched->mesh);
-    frame.detail = detail_that_stays(reference.decoded.detail, mesh.positions.size(), patched->stays, frame.decoded);
+    frame.detail = std::move(detail);
     if (by_nodes.has_presence) {
         frame.presence = presence_of_patched(tracked.state.presence, patched->stays, vertices);
         out.presence = on_new_reference(tracked.presence, patched->stays, vertices);
