@@ -25,9 +25,9 @@ struct TrackingNumbers {
     // Where simplification keeps more of the captured vertices than that, levels are not tried: what is left to say is
     // the capture's own triangles (docs/experiments/hierarchy.md).
     double levels_most_kept = 0.72;
-    // How much more a reference in levels must save that has charts, as a logarithm of the price: on its coarser
-    // triangles pictures take more bits (docs/experiments/hierarchy.md).
-    double levels_margin_with_charts = 0.15;
+    // The same where there are charts: on triangles much coarser than the capture's, pictures take more bits than is
+    // saved.
+    double levels_most_kept_with_charts = 0.28;
     double levels_step = 0.85;  // step of an I-frame's finest displacements, where it has levels, in steps of positions
     std::uint32_t referred_level = 1;  // the level that T-frames refer to
     double finer_renewed = 0.5;  // step of an I-frame made of the tracked mesh, in steps of one made of the capture:

@@ -207,11 +207,13 @@ bool codes_levels(const TrackedWork& work, const LatticeMesh& simple) {
     const auto& mesh = work.captured.mesh;
     const auto wanted = options.tracked.levels;
     if (wanted == ReferenceLevels::off || (wanted == ReferenceLevels::automatic && !work.effort.levels)) return false;
+    const bool with_charts = options.texture.layout == TextureLayout::charts && wanted == ReferenceLevels::automatic;
+    const double most_kept =
+        with_charts ? tracking_numbers.levels_most_kept_with_charts : tracking_numbers.levels_most_kept;
     return !options.intra_coder && (!configuration.tells_presence() || wanted == ReferenceLevels::on) &&
            options.texture.layout != TextureLayout::captured && !simple.positions.empty() && mesh.texcoords.empty() &&
            !configuration.intra_only() &&
-           static_cast<double>(simple.positions.size()) <=
-               tracking_numbers.levels_most_kept * static_cast<double>(mesh.positions.size());
+           static_cast<double>(simple.positions.size()) <= most_kept * static_cast<double>(mesh.positions.size());
 }
 
 // What a coding of the same surface costs: bits where the error is equal, since a bit that is saved there brings so
@@ -233,10 +235,7 @@ Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameS
     if (codes_levels(work, simple)) {
         auto leveled = code_levels(work, steps, reason);
         if (!leveled) return tl::unexpected(leveled.error());
-        const bool asked = work.configuration.options.tracked.levels == ReferenceLevels::on;
-        const double margin = asked || chosen.frame.textured.empty() ? 0 : tracking_numbers.levels_margin_with_charts;
-        if (*leveled && price_of(work, (*leveled)->frame) + margin < price_of(work, chosen.frame))
-            chosen = std::move(**leveled);
+        if (*leveled && price_of(work, (*leveled)->frame) < price_of(work, chosen.frame)) chosen = std::move(**leveled);
     }
     prepare_reference(work, chosen);
     return flat;
