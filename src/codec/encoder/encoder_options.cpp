@@ -309,7 +309,8 @@ constexpr Option list[] = {
      .meaning =
          "the meshes that T-frames refer to as a base mesh, subdivided, with detail as displacements: about half the "
          "bits, for a second or more of encoding each; auto, from effort 3 on where that costs less, surface does not "
-         "come and go, there is no texture and nobody watches live; on, at any effort; off, all vertices are coded "
+         "come and go, nobody watches live and meshes have no texture coordinates of their own; on, at any effort; "
+         "off, all vertices are coded "
          "alike",
      .words = reference_levels,
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.levels); },
