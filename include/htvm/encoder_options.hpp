@@ -52,7 +52,8 @@ enum class TrackedReferences : std::uint8_t {
 // Whether the meshes that T-frames refer to are coded as a base mesh, subdivided, with detail as displacements. They
 // take about half the bits, and a second or more of encoding each.
 enum class ReferenceLevels : std::uint8_t {
-    automatic,  // from effort 3 on, where surface does not come and go and meshes have no texture coordinates of their own
+    automatic,  // from effort 3 on, where surface does not come and go and meshes have no texture coordinates of their
+                // own
     off,
     on,  // likewise, at any effort
 };

@@ -105,7 +105,7 @@ LatticeMeshView with_detail(DecoderState& state, const LatticeMeshView& mesh, st
     fine.colours.assign(mesh.colours.begin(), mesh.colours.end());
     fine.normals.assign(mesh.normals.begin(), mesh.normals.end());
     presence.assign(mesh.presence.begin(), mesh.presence.end());
-    add_detail(detail, levels, mesh.triangles, fine.positions);
+    add_detail(detail, levels, mesh.triangles, fine.positions, state.threads);
     add_detail(detail, levels, fine.colours);
     add_detail(detail, levels, fine.normals);
     add_detail(detail, levels, presence);

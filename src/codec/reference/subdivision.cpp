@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/parallel.h"
+
 namespace htvm::internal {
 namespace {
 
@@ -187,6 +189,24 @@ LatticePoint displaced_vertex(const Vector3d& expected, const Vector3d& normal, 
         return within_lattice(whole - (moved < static_cast<double>(whole)));
     };
     return {along(0), along(1), along(2)};
+}
+
+void add_vertices(const SubdivisionLevel& level, const SubdivisionRule& rule, std::span<const Triangle> triangles,
+                  std::span<const double> displacements, std::vector<LatticePoint>& positions, Threads threads) {
+    const auto normals = vertex_normals(positions, triangles);
+    const std::size_t first = positions.size();
+    positions.resize(first + level.stencils.size());
+    const auto before = std::span<const LatticePoint>(positions).first(first);
+    parallel_for(level.stencils.size(), threads, 2048, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const auto& stencil = level.stencils[i];
+            // Most are not displaced, and then the normal need not be known.
+            const Vector3d along =
+                displacements[i] != 0 ? normalised(normals[stencil.a] + normals[stencil.b]) : Vector3d{};
+            positions[first + i] =
+                displaced_vertex(expected_vertex(before, normals, stencil, rule), along, displacements[i]);
+        }
+    });
 }
 
 namespace {

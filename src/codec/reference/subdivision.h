@@ -16,6 +16,7 @@
 
 #include "core/geometry.h"
 #include "core/lattice.h"
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 
 namespace htvm::internal {
@@ -86,6 +87,11 @@ struct SubdivisionDepth {
     std::uint32_t longest_edge = 160;
 };
 inline constexpr std::uint32_t most_levels = 8;
+
+// Adds a level's vertices behind those before it: each where the rule expects it, and as far off that along its normal.
+// triangles: before the level. displacements: of each new vertex.
+void add_vertices(const SubdivisionLevel& level, const SubdivisionRule& rule, std::span<const Triangle> triangles,
+                  std::span<const double> displacements, std::vector<LatticePoint>& positions, Threads threads);
 
 // All levels of a base mesh. They follow from the base alone, not from how its surface is moved: lengths are those on
 // the base's flat triangles. Where two sides of a triangle are split, the quadrangle that remains is cut along its

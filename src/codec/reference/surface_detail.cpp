@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 
-#include "core/geometry.h"
 #include "core/lattice.h"
 
 namespace htvm::internal {
@@ -22,19 +21,14 @@ void add_means(const SurfaceDetail& detail, std::size_t shown, std::vector<Value
 }  // namespace
 
 void add_detail(const SurfaceDetail& detail, std::size_t shown, std::span<const Triangle> triangles,
-                std::vector<LatticePoint>& positions) {
+                std::vector<LatticePoint>& positions, Threads threads) {
     const std::size_t of_reference = positions.size();
     for (std::size_t k = 0; k < shown; ++k) {
         const auto& level = detail.levels[k];
-        const auto normals = vertex_normals(positions, k == 0 ? triangles : detail.triangles(k));
-        for (const auto& s : level.stencils) {
-            const double displacement = detail.displacements[positions.size() - of_reference];
-            // Most are not displaced, and then the normal need not be known.
-            const Vector3d along = displacement != 0 ? normalised(normals[s.a] + normals[s.b]) : Vector3d{};
-            const auto at =
-                displaced_vertex(expected_vertex(positions, normals, s, detail.rules[k]), along, displacement);
-            positions.push_back(at);
-        }
+        const auto displacements =
+            std::span(detail.displacements).subspan(positions.size() - of_reference, level.stencils.size());
+        add_vertices(level, detail.rules[k], k == 0 ? triangles : detail.triangles(k), displacements, positions,
+                     threads);
     }
 }
 

@@ -28,7 +28,7 @@ struct SurfaceDetail {
 
 // Adds the vertices of the first levels behind the reference's, as it was moved. triangles: of the reference.
 void add_detail(const SurfaceDetail& detail, std::size_t shown, std::span<const Triangle> triangles,
-                std::vector<LatticePoint>& positions);
+                std::vector<LatticePoint>& positions, Threads threads = {});
 
 // The mean of two colours and what is added to it.
 Colour off_mean(const Colour& a, const Colour& b, const std::array<std::int32_t, 3>& more);
