@@ -28,6 +28,7 @@ ShownMesh shown(CodedFrame& frame, const Reference* reference) {
         out.mesh = detailed(detail, std::move(frame.decoded));
     else
         out = {shown_mesh(frame.decoded, textured), textured.copied};
+    if (frame.projection) project(*frame.projection, out.mesh.positions, out.mesh.texcoords);
     if (!anything_absent(frame.presence)) return out;
     auto presence = frame.presence;
     add_detail(detail, detail.levels.size(), presence);
