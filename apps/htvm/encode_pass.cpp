@@ -168,6 +168,9 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
                    const std::shared_ptr<const TexturedMesh>& textured) {
     auto& summary = pass.summary;
     const auto start = std::chrono::steady_clock::now();
+    const auto on_film =
+        pass.plan.film ? Result<std::optional<Framed>>(framed(pass, mesh, textured.get())) : std::optional<Framed>();
+    if (!on_film) return tl::unexpected(on_film.error());
     TimedFrame timed;
     timed.timestamp_us = timestamp_us;
     const double held_before = pass.held_back();
@@ -198,9 +201,6 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     const bool key_frame = pass.wants_key_frame && pass.wants_key_frame();
     const bool access = pass.wants_access && pass.wants_access(timestamp_us);
     if (access) pass.encoder.request_access();
-    const auto on_film =
-        pass.plan.film ? Result<std::optional<Framed>>(framed(pass, mesh, textured.get())) : std::optional<Framed>();
-    if (!on_film) return tl::unexpected(on_film.error());
     const auto pushed = pass.encoder.push(*on_film ? (*on_film)->mesh : mesh, pose, timestamp_us, key_frame);
     if (limited)
         if (auto set = set_repair(pass, {}); !set) return tl::unexpected(set.error());
