@@ -328,10 +328,14 @@ const char* layout_text(TextureLayout layout) {
 
 const char* layout_word(TextureLayout layout) {
     switch (layout) {
-        case TextureLayout::none: break;
-        case TextureLayout::captured: return "captured";
-        case TextureLayout::charts: return "charts";
-        case TextureLayout::projection: return "projection";
+        case TextureLayout::none:
+            break;
+        case TextureLayout::captured:
+            return "captured";
+        case TextureLayout::charts:
+            return "charts";
+        case TextureLayout::projection:
+            return "projection";
     }
     return "none";
 }
@@ -521,7 +525,8 @@ void print_totals(const Inspection& in) {
                    audio.bytes);
     if (pictures.pictures > 0)
         fmt::print("pictures: {}{}, {} of them key pictures, {} bytes, {:.2f} Mbit/s\n",
-                   layout_text(sequence.texture.layout), kinds_text(pictures), pictures.keys, pictures.bytes, 8e-6 * static_cast<double>(pictures.bytes) / size.seconds);
+                   layout_text(sequence.texture.layout), kinds_text(pictures), pictures.keys, pictures.bytes,
+                   8e-6 * static_cast<double>(pictures.bytes) / size.seconds);
     if (patched.patched > 0)
         fmt::print("patches in {} replace {:.2f} % of the surface a T- or TP-frame on average, at most {:.1f} %\n",
                    counted(patched.patched, "TP-frame"), 100 * patched.mean(), 100 * patched.largest);

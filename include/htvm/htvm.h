@@ -134,8 +134,8 @@ enum {
 const char* htvm_frame_reason_name(uint32_t reason);
 
 /* attributes of a mesh besides positions: bits */
-/* HTVM_MOVING_TEXCOORDS: a decoded frame's texture coordinates are a camera's projection of its positions, and so others
- * in each frame, whatever its topology. */
+/* HTVM_MOVING_TEXCOORDS: a decoded frame's texture coordinates are a camera's projection of its positions, and so
+ * others in each frame, whatever its topology. */
 enum { HTVM_COLOURS = 1, HTVM_NORMALS = 2, HTVM_TEXCOORDS = 4, HTVM_MOVING_TEXCOORDS = 8 };
 
 typedef struct htvm_frame_info {

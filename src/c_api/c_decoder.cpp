@@ -82,7 +82,8 @@ htvm_status describe_current(htvm_decoder& decoder, htvm_frame_info* info, std::
     const auto& frame = *decoder.current;
     auto out = htvm::c_api::describe(frame.info, htvm::c_api::attributes_of(frame.mesh));
     const auto& sequence = decoder.decoder.sequence();
-    if ((out.attributes & HTVM_TEXCOORDS) != 0 && sequence && sequence->texture.layout == htvm::TextureLayout::projection)
+    if ((out.attributes & HTVM_TEXCOORDS) != 0 && sequence &&
+        sequence->texture.layout == htvm::TextureLayout::projection)
         out.attributes |= HTVM_MOVING_TEXCOORDS;
     out.joints = static_cast<std::uint32_t>(frame.pose->joints.size());
     out.bones = static_cast<std::uint32_t>(frame.pose->orientations.size());

@@ -79,7 +79,8 @@ TEST(Contradictions, WhatTheEncoderDoesNotTakeTogetherIsSaidInFlags) {
 }
 
 TEST(Contradictions, SettingsOfVideoNeedPicturesThatAreCodedAsVideo) {
-    const std::string advice = ": is for pictures that are coded as video: add --texture-as picture, projection or "
+    const std::string advice =
+        ": is for pictures that are coded as video: add --texture-as picture, projection or "
         "captured";
     auto request = usual();
     request.pictures.size = 512;

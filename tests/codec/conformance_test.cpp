@@ -1,8 +1,8 @@
 // Streams that every version must decode to the same integers, each with a digest per frame: *.htvm and *.digests in
 // tests/data/conformance. Those whose names have no number are of the stream's version 1, NAME_2 and NAME_3 of versions
 // 2 and 3, and no encoder writes them any more; NAME_4 are of version 4, NAME_5 of 5, NAME_6 of 6,
-// NAME_7 of 7, NAME_8 of 8. HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of versions 4 to 8 that are there; NAME_4
-// writes that one, whether it is there or not.
+// NAME_7 of 7, NAME_8 of 8. HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of versions 4 to 8 that are there;
+// NAME_4 writes that one, whether it is there or not.
 #include <gtest/gtest.h>
 
 #include <algorithm>

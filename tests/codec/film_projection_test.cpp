@@ -88,8 +88,8 @@ TEST(FilmedFrames, HaveThePlacesOfTheirDecodedPositionsInTheFilm) {
                 EXPECT_TRUE(mesh.colours.empty()) << "the pictures say them";
                 for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
                     const auto& p = mesh.positions[v];
-                    const auto [x, y] = camera.place(static_cast<double>(p[0]), static_cast<double>(p[1]),
-                                                     static_cast<double>(p[2]));
+                    const auto [x, y] =
+                        camera.place(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
                     constexpr double pixel_share = 0.02;
                     ASSERT_NEAR(static_cast<double>(mesh.texcoords[v][0]), x, pixel_share / 512);
                     ASSERT_NEAR(static_cast<double>(mesh.texcoords[v][1]), y, pixel_share / 256);
@@ -107,7 +107,7 @@ TEST(FilmedFrames, OfOneReferenceHaveOneTopologyAndPlacesOfTheirOwn) {
 }
 
 TEST(FilmedFrames, WithAPatchAreTheEncoders) {
-    const auto coded = encode(filmed(two_balls(6)), filmed_options());
+    const auto coded = encode(filmed(turned(two_balls(6))), filmed_options());
     ASSERT_TRUE(coded.errors.empty());
     const auto whole = decoded_frames(coded.packets);
     std::size_t patched = 0;

@@ -30,8 +30,8 @@ inline Mesh filmed(const Mesh& whole, const FilmCamera& camera) {
             if (as == none) {
                 as = static_cast<std::uint32_t>(out.positions.size());
                 const auto& p = whole.positions[t[k]];
-                const auto [u, v] = camera.place(static_cast<double>(p[0]), static_cast<double>(p[1]),
-                                                 static_cast<double>(p[2]));
+                const auto [u, v] =
+                    camera.place(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
                 out.positions.push_back(p);
                 out.colours.push_back(whole.colours[t[k]]);
                 out.texcoords.push_back({static_cast<float>(u), static_cast<float>(v)});
@@ -50,6 +50,14 @@ inline TestSequence filmed(TestSequence sequence, double step = 0) {
         frame.mesh = filmed(frame.mesh, camera);
         camera.right += step;
     }
+    return sequence;
+}
+
+// By half a right angle, so that the camera sees both places of a horn.
+inline TestSequence turned(TestSequence sequence) {
+    constexpr float half = 0.70710678f;
+    for (auto& frame : sequence.frames)
+        for (auto& p : frame.mesh.positions) p = {half * (p[0] - p[2]), p[1], half * (p[0] + p[2])};
     return sequence;
 }
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -38,8 +40,8 @@ Pairs seen_by(const ProjectionMatrix& camera, double noise = 0, unsigned seed = 
         const double depth = 800 + 60 * std::sin(x / 50) * std::cos(y / 70);
         const double u = 0.5 + 1.1 * x / 800, v = 0.5 + 1.4 * y / 800;
         out.positions.push_back(back * (depth * Eigen::Vector3d(u, v, 1) - camera.col(3)));
-        out.texcoords.push_back({static_cast<float>(u + noise * error(random) / 640),
-                                 static_cast<float>(v + noise * error(random) / 480)});
+        out.texcoords.push_back(
+            {static_cast<float>(u + noise * error(random) / 640), static_cast<float>(v + noise * error(random) / 480)});
     }
     return out;
 }

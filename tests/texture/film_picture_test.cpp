@@ -11,7 +11,8 @@ namespace {
 constexpr Colour subject{200, 100, 50}, background{0, 0, 255};
 
 Colour pixel_at(const Image& image, int x, int y) {
-    const auto i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x));
+    const auto i =
+        3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x));
     return {image.rgb[i], image.rgb[i + 1], image.rgb[i + 2]};
 }
 
