@@ -243,13 +243,12 @@ std::vector<Vector2f> texcoords_in_window(const TexturedMesh& captured, const Fi
 }
 
 FilmWindow FilmFraming::next(const TexturedMesh& captured) {
-    constexpr double room = 1.1, much_room = 1.4;
+    constexpr double room = 1.1, much_too_large = 1.4;
     const auto extent = extent_of(captured);
-    const double needed =
-        std::max({extent.width() / first_.width, extent.height() / first_.height, 1.0 / first_.width});
-    const bool is_larger = window_.width > first_.width;
-    if (holds(window_, extent) && !(is_larger && needed * much_room < 1)) return window_;
-    const double scale = needed * room <= 1 ? 1 : needed * room;
+    const double needed = std::max(extent.width() / first_.width, extent.height() / first_.height);
+    const double scale = std::max(needed * room, 1.0);
+    const double now = 1.0 * window_.width / first_.width;
+    if (holds(window_, extent) && now < scale * much_too_large) return window_;
     window_ = centred(extent, static_cast<int>(std::lround(scale * first_.width)),
                       static_cast<int>(std::lround(scale * first_.height)));
     return window_;
