@@ -68,7 +68,7 @@ htvm_tests(metrics htvm_metrics)
 htvm_tests(live htvm_live htvm_c_live)
 htvm_tests(apps htvm_app)
 htvm_tests(lab htvm_laboratory)
-foreach(name command_line captures capture_kinds recordings efforts textures textured_streams synthetic coverage outputs editing jobs chunks audio mp4 gltf pictures publish serve use)
+foreach(name command_line captures capture_kinds recordings efforts textures textured_streams film synthetic coverage outputs editing jobs chunks audio mp4 gltf pictures publish serve use)
   add_test(NAME ${name} COMMAND ${PROJECT_SOURCE_DIR}/tests/apps/${name}.sh $<TARGET_FILE:htvm>)
 endforeach()
 add_test(NAME lab_command_line COMMAND ${PROJECT_SOURCE_DIR}/tests/lab/command_line.sh $<TARGET_FILE:htvm-lab>

@@ -20,7 +20,8 @@ htvm_floor(sound DIRECTORY src/sound LINKS htvm_decoder htvm_io PkgConfig::HTVM_
 # Streams in .mp4 files and in segments for HTTP.
 htvm_floor(container DIRECTORY src/container LINKS htvm_decoder)
 # Above the encoder's surface: pictures of a capture's texture in the layout of a stream's charts.
-htvm_floor(texture_baking SOURCES src/texture/texture_baking.cpp src/texture/surface_matches.cpp LINKS htvm_core htvm_surface)
+htvm_floor(texture_baking SOURCES src/texture/texture_baking.cpp src/texture/surface_matches.cpp
+  src/texture/film_picture.cpp LINKS htvm_core htvm_surface)
 htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
 
 # Draco-coded I-frames: plugs into the encoder and the decoder, which do not depend on libdraco.
@@ -47,7 +48,7 @@ function(htvm_program_library name folder)
   # The work is in the libraries; optimising the options and tables would take a quarter of the whole build.
   target_compile_options(htvm_${name} PRIVATE $<IF:$<CONFIG:Debug>,-O0,-O1>)
 endfunction()
-htvm_program_library(command_line command_line htvm_core htvm_io htvm_images htvm_metrics CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
+htvm_program_library(command_line command_line htvm_core htvm_io htvm_images htvm_metrics htvm_texture_baking CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
 target_compile_definitions(htvm_command_line PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
 include(cmake/embed.cmake)
 include(cmake/live.cmake)

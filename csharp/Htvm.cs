@@ -60,6 +60,7 @@ namespace Htvm
         Colours = 1,
         Normals = 2,
         Texcoords = 4,
+        MovingTexcoords = 8, // a camera's projection of the positions, others in each frame whatever its topology
     }
 
     // Where the subject's head is.
@@ -506,7 +507,7 @@ namespace Htvm
                 Grow(ref Normals, 3 * vertices);
                 decoder.CopyNormals(Normals);
             }
-            if (Has(Attributes.Texcoords) && ReferenceChanged)
+            if (Has(Attributes.Texcoords) && (ReferenceChanged || Has(Attributes.MovingTexcoords)))
             {
                 Grow(ref Texcoords, 2 * vertices);
                 decoder.CopyTexcoords(Texcoords);

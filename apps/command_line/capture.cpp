@@ -17,6 +17,7 @@
 #include "io/texture_colours.h"
 #include "metrics/front.h"
 #include "metrics/percentile.h"
+#include "texture/film_picture.h"
 
 namespace htvm::app {
 namespace {
@@ -152,11 +153,12 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
     add_choice(
         command, "--texture-as", options.texture_as, texture_uses,
         "What becomes of a texture: picture, drawn anew in a layout that lasts, and coded as video (with --profile\n"
-        "tracked); captured, coordinates as they are and images coded as video (with --profile topology); keep,\n"
+        "tracked); projection, of one camera's film, which is coded as video beside how that camera saw each frame\n"
+        "(likewise); captured, coordinates as they are and images coded as video (with --profile topology); keep,\n"
         "the same with the images' files as they are; coordinates, the same without images; or colours at the\n"
-        "vertices. Default: of encode picture; colours with --profile topology and --profile paper, with --jobs and\n"
-        "--job, and where frames are waited for, as with --deadline and a hub; of meshes that have vertex colours\n"
-        "of their own these")
+        "vertices. Default: of encode picture, or projection where the first mesh's coordinates are one camera's;\n"
+        "colours with --profile topology and --profile paper, with --jobs and --job, and where frames are waited\n"
+        "for, as with --deadline and a hub; of meshes that have vertex colours of their own these")
         ->group(heading::textures);
 }
 
@@ -179,7 +181,8 @@ void add_texture_options(CLI::App& command, TextureOptions& options) {
 }
 
 bool keeps_pictures(TextureAs use) {
-    return use == TextureAs::picture || use == TextureAs::captured || use == TextureAs::keep;
+    return use == TextureAs::picture || use == TextureAs::projection || use == TextureAs::captured ||
+           use == TextureAs::keep;
 }
 
 bool is_piped(const CaptureOptions& options) { return options.inputs == std::vector<std::string>{"-"}; }
@@ -425,6 +428,7 @@ void Capture::decide_texture() {
     texture_as_ = options_.texture_as;
     if (texture_as_ != TextureAs::by_default || !peeked_->texture) return;
     texture_as_ = peeked_->mesh.colours.empty() ? options_.of_images : TextureAs::colours;
+    if (texture_as_ == TextureAs::picture && is_film(*peeked_)) texture_as_ = TextureAs::projection;
 }
 
 // From the first mesh, in its file's unit.
@@ -604,7 +608,9 @@ void Capture::tell_of_texture() const {
         note(fmt::format("the texture ({}, {} x {} pixels) is {}{}", image, texture->width, texture->height,
                          texture_as_ == TextureAs::keep      ? "kept as it is"
                          : texture_as_ == TextureAs::picture ? "drawn anew in a layout that lasts, and coded as video"
-                                                             : "coded as video, with its coordinates as captured",
+                         : texture_as_ == TextureAs::projection
+                             ? "one camera's film, and coded as video with that camera's projection"
+                             : "coded as video, with its coordinates as captured",
                          is_default ? "; --texture-as colours has its colours at the vertices instead, without its "
                                       "details, in less time and with fewer bits"
                                     : ""));
@@ -660,9 +666,10 @@ Capture::Encodable Capture::as_encoded(TexturedMesh captured, const Wanted& want
     out.textured = std::make_shared<const TexturedMesh>(std::move(captured));
     // Tracking goes by the colours at vertices, where there are pictures too.
     constexpr double texels = 2;
-    if (pictures == PicturesOf::capture)
-        out.mesh = out.textured->mesh;
-    else
+    if (pictures == PicturesOf::capture || pictures == PicturesOf::film) out.mesh = out.textured->mesh;
+    if (pictures == PicturesOf::film)
+        out.mesh.colours = colours_with_texture(*out.textured, {}, texels);
+    else if (pictures != PicturesOf::capture)
         out.mesh = with_vertex_colours(*out.textured, {}, pictures == PicturesOf::stream ? texels : 1);
     return out;
 }
@@ -683,6 +690,7 @@ Capture::Wanted Capture::wanted() const {
 
 Capture::PicturesOf Capture::pictures_of() const {
     if (!keeps_pictures(texture_as_)) return PicturesOf::nothing;
+    if (texture_as_ == TextureAs::projection) return PicturesOf::film;
     return texture_as_ == TextureAs::picture ? PicturesOf::stream : PicturesOf::capture;
 }
 

@@ -37,13 +37,14 @@ enum class TextureAs : std::uint8_t {
     colours,      // colours at the vertices, whatever the meshes have
     coordinates,  // coordinates stay as they are, and the image is left out
     picture,      // it is drawn anew in a layout that lasts, and coded as video
+    projection,   // it is one camera's film, which is coded as video, and the camera's projection goes with it
     captured,     // coordinates and images stay as they are, the images coded as video
     keep,         // the same, with the images' files as they are
 };
 inline constexpr std::array texture_uses = {
-    Choice<TextureAs>{"colours", TextureAs::colours}, Choice<TextureAs>{"coordinates", TextureAs::coordinates},
-    Choice<TextureAs>{"picture", TextureAs::picture}, Choice<TextureAs>{"captured", TextureAs::captured},
-    Choice<TextureAs>{"keep", TextureAs::keep},
+    Choice<TextureAs>{"colours", TextureAs::colours},   Choice<TextureAs>{"coordinates", TextureAs::coordinates},
+    Choice<TextureAs>{"picture", TextureAs::picture},   Choice<TextureAs>{"projection", TextureAs::projection},
+    Choice<TextureAs>{"captured", TextureAs::captured}, Choice<TextureAs>{"keep", TextureAs::keep},
 };
 
 inline constexpr std::array up_axes = {
@@ -70,10 +71,12 @@ struct CaptureOptions {
     double skeleton_offset = 0;      // seconds added to the skeleton's clock
     TextureOptions texture;          // where images are
     TextureAs texture_as = TextureAs::by_default;
-    TextureAs of_images = TextureAs::colours;  // what becomes of them by default: colours, picture or captured
-    std::string why_no_pictures;               // where these are colours, for people; empty: nobody expects pictures
-    bool tells_odd_sizes = true;               // warns of frames whose size is odd; else who looks at all of them does
-    bool keeps_idle_texcoords = true;          // texture coordinates for which no image is used, unless asked for
+    // What becomes of them by default: colours, picture, which is projection where they are one camera's film, or
+    // captured.
+    TextureAs of_images = TextureAs::colours;
+    std::string why_no_pictures;             // where these are colours, for people; empty: nobody expects pictures
+    bool tells_odd_sizes = true;             // warns of frames whose size is odd; else who looks at all of them does
+    bool keeps_idle_texcoords = true;        // texture coordinates for which no image is used, unless asked for
     WhileBusy while_busy = WhileBusy::wait;  // of standard input: what becomes of frames that come faster than they are
                                              // taken
 };
@@ -173,8 +176,8 @@ private:
         std::vector<MeshRemark> remarks = {};
         ColourLevels levels = {};  // of colours whose type does not say their range
     };
-    // Which pictures the stream has: those of the capture, or of its own layout.
-    enum class PicturesOf { nothing, capture, stream };
+    // Which pictures the stream has: those of the capture, of its own layout, or one camera's film.
+    enum class PicturesOf { nothing, capture, stream, film };
     PicturesOf pictures_of() const;
     // What of a captured mesh goes into the stream.
     struct Wanted {

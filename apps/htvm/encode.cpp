@@ -399,6 +399,11 @@ private:
         auto& texture = passes_.settings.texture;
         if (texture.layout == TextureLayout::charts && passes_.plan.pictures.size == 0)
             texture.width = texture.height = picture_side_of(usual_side_, std::min(quality, 100.0));
+        if (passes_.plan.film && passes_.plan.pictures.size == 0) {
+            const auto pictures = film_size_at(*passes_.plan.film, quality);
+            texture.width = pictures.width;
+            texture.height = pictures.height;
+        }
     }
     Passes& passes_;
     double of_all_, mesh_bits_ = 0, quality_of_size_ = 0;
@@ -465,6 +470,7 @@ Result<void> encode(const EncodePlan& plan) {
     if (auto may_log = check_effort_log(plan, *capture); !may_log) return may_log;
     auto decided = plan;
     decided.capture.texture_as = capture->texture_as();
+    decided.film = film_of(*capture);
     auto settings = settings_for(decided, *capture);
     if (!settings) return tl::unexpected(settings.error());
     const auto audio = AudioTrack::open(plan.audio);

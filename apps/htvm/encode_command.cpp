@@ -203,7 +203,8 @@ FrontPage front_page() {
             {"--skeleton", "The tracked skeleton, if there is one: JSON or BVH"},
             {"--texture-as",
              "What becomes of a texture: picture (default), which is coded as video and keeps\n"
-             "details, or colours at the vertices: less time, fewer bits; --help-all has the others"},
+             "details (projection where it is one camera's film), or colours at the vertices: less time, fewer bits; "
+             "--help-all has the others"},
             {"--audio", "Sound that begins with the first frame"},
             {"--deadline", "Live: milliseconds that a frame may take; where time is short, less is searched"},
         },

@@ -91,6 +91,7 @@ auto at_segments(double seconds) {
 
 Result<void> open(Work& work, Capture& capture, const std::optional<AudioTrack>& audio, double segment_seconds) {
     work.plan.capture.texture_as = capture.texture_as();
+    work.plan.film = film_of(capture);
     auto settings = settings_for(work.plan, capture);
     if (!settings) return tl::unexpected(settings.error());
     work.settings = std::move(*settings);

@@ -147,10 +147,30 @@ void drop(Pass& pass, const std::string& frame, const Error& error) {
     warn_of_frame(pass, FrameWarnings::dropped, fmt::format("{} is dropped: {}", frame, error.message));
 }
 
+// A mesh whose texture coordinates are in the part of its camera's film that is sent, and that part.
+struct Framed {
+    Mesh mesh;
+    FilmWindow window;
+};
+
+Result<Framed> framed(Pass& pass, const Mesh& mesh, const TexturedMesh* textured) {
+    if (!mesh.triangles.empty() && (!textured || mesh.texcoords.size() != textured->mesh.texcoords.size()))
+        return fail(ErrorKind::bad_input, pass.capture.name() + " has no image, or no texture coordinates");
+    if (!pass.framing) pass.framing.emplace(*pass.plan.film);
+    Framed out{mesh, *pass.plan.film};
+    if (mesh.triangles.empty()) return out;
+    out.window = pass.framing->next(*textured);
+    out.mesh.texcoords = texcoords_in_window(*textured, out.window);
+    return out;
+}
+
 Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us,
                    const std::shared_ptr<const TexturedMesh>& textured) {
     auto& summary = pass.summary;
     const auto start = std::chrono::steady_clock::now();
+    const auto on_film =
+        pass.plan.film ? Result<std::optional<Framed>>(framed(pass, mesh, textured.get())) : std::optional<Framed>();
+    if (!on_film) return tl::unexpected(on_film.error());
     TimedFrame timed;
     timed.timestamp_us = timestamp_us;
     const double held_before = pass.held_back();
@@ -181,7 +201,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     const bool key_frame = pass.wants_key_frame && pass.wants_key_frame();
     const bool access = pass.wants_access && pass.wants_access(timestamp_us);
     if (access) pass.encoder.request_access();
-    const auto pushed = pass.encoder.push(mesh, pose, timestamp_us, key_frame);
+    const auto pushed = pass.encoder.push(*on_film ? (*on_film)->mesh : mesh, pose, timestamp_us, key_frame);
     if (limited)
         if (auto set = set_repair(pass, {}); !set) return tl::unexpected(set.error());
     summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -198,7 +218,9 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         pass.step("dropped");
         return Coded::dropped;
     }
-    if (pass.pictures && pass.write && textured) pass.pictures->add(timestamp_us, textured);
+    if (pass.pictures && pass.write && textured)
+        pass.pictures->add(timestamp_us, textured,
+                           *on_film ? std::optional((*on_film)->window) : std::optional<FilmWindow>());
     if (auto taken = take_coded(pass); !taken) return tl::unexpected(taken.error());
     if (pass.deadline) {
         const double held = pass.held_back() - held_before;

@@ -71,9 +71,10 @@ struct Pass {
     std::function<std::optional<double>()> bitrate = {};  // asked after each frame: bits per second, where it changes
     std::function<double()> held_back = [] { return 0.0; };  // milliseconds so far that packets waited until due
     Deadline* deadline = nullptr;  // how much is searched for each frame, and how long that takes; null: not counted
-    std::vector<LoggedFrame> efforts = {};  // of each frame, in place of what the deadline says; empty: as that says
-    EffortLogWriter* effort_log = nullptr;  // takes what was decided of each frame; null: nobody asked for it
-    PictureTrack* pictures = nullptr;       // of the frames; null: none go into the stream
+    std::vector<LoggedFrame> efforts = {};    // of each frame, in place of what the deadline says; empty: as that says
+    EffortLogWriter* effort_log = nullptr;    // takes what was decided of each frame; null: nobody asked for it
+    PictureTrack* pictures = nullptr;         // of the frames; null: none go into the stream
+    std::optional<FilmFraming> framing = {};  // of one camera's film, once the first frame has come
     double slower_line = 0;      // the bitrate that the line carries at present, where it is below the one asked for
     bool saw_triangles = false;  // in a frame so far, or of those before
     bool may_go_on = true;  // false: what went wrong is of no single frame, and those behind it would fare no better

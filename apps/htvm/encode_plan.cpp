@@ -105,28 +105,32 @@ std::string in_pictures(const EncodeRequest& request) {
                               : pictures.codec   ? "--texture-codec"
                               : pictures.quality ? "--texture-quality"
                                                  : nullptr;
-    if (about_video && use != TextureAs::captured && use != TextureAs::picture)
-        return refused(about_video, "is for pictures that are coded as video: add --texture-as picture or captured");
+    if (about_video && use != TextureAs::captured && use != TextureAs::picture && use != TextureAs::projection)
+        return refused(about_video,
+                       "is for pictures that are coded as video: add --texture-as picture, projection or captured");
     if (has_bitrate(request) && pictures.quality)
         return refused("--texture-quality", "follows from --bitrate; give one of the two");
     if (is_default || !keeps_pictures(use)) return {};
     const bool tracked = request.encoding.profile == Profile::tracked;
     const std::string word = word_of(use, texture_uses);
-    if (tracked && use != TextureAs::picture)
+    const bool lasts = use == TextureAs::picture || use == TextureAs::projection;
+    if (tracked && !lasts)
         return refused("--texture-as",
                        word +
                            " keeps every frame's own texture coordinates, which --profile tracked does not: add "
                            "--profile topology, or give picture");
-    if (!tracked && use == TextureAs::picture)
+    if (!tracked && lasts)
         return refused("--texture-as",
-                       "picture is drawn on a mesh that lasts, as --profile tracked makes it; with other profiles give "
-                       "captured");
+                       word +
+                           " is drawn on a mesh that lasts, as --profile tracked makes it; with other profiles give "
+                           "captured");
     if (request.capture.texture.files == "none")
         return refused("--texture", "none leaves no images for --texture-as " + word);
-    if (use == TextureAs::picture && is_cut(request) && request.chunks == 1)
+    if (lasts && is_cut(request) && request.chunks == 1)
         return refused("--texture-as",
-                       "picture goes through the capture in one, as each frame's is drawn over the one before; not "
-                       "with --jobs or --job, but with --chunks");
+                       word +
+                           " goes through the capture in one, as each frame's is drawn over the one before; not "
+                           "with --jobs or --job, but with --chunks");
     if (has_bitrate(request) && use == TextureAs::keep)
         return refused("--texture-as",
                        "keep leaves image files as large as they are, which no --bitrate can change; captured codes "

@@ -86,6 +86,9 @@ struct EncodePlan {
     TexturePictureOptions pictures;  // where the capture's images go into the stream
     bool pictures_foresee = false;   // nobody waits, and bits are worth the time
 
+    std::optional<FilmWindow> film = {};  // where the texture is one camera's film, once the capture is open: what of
+                                          // it goes into the stream at first
+
     EncoderOptions encoder;  // all but what the capture says: its rate, unit, axes, skeleton, radii, texture
     int access_interval_with_pictures = 0;  // frames, in place of the encoder's, where pictures are drawn anew
     Floor floor;

@@ -59,8 +59,8 @@ Result<void> set_texture(const EncodePlan& plan, const Capture& capture, Encoder
     }
     const auto* first = capture.first_textured();
     if (!first) return fail(ErrorKind::bad_input, "the capture's first mesh has no texture");
-    const bool bake = use == TextureAs::picture;
-    settings.texture.layout = bake ? TextureLayout::charts : TextureLayout::captured;
+    const bool bake = use == TextureAs::picture, film = use == TextureAs::projection;
+    settings.texture.layout = bake ? TextureLayout::charts : film ? TextureLayout::projection : TextureLayout::captured;
     const auto& image = *first->texture;
     const int size = use == TextureAs::keep ? 0 : plan.pictures.size;
     constexpr long least = 16;
@@ -69,6 +69,19 @@ Result<void> set_texture(const EncodePlan& plan, const Capture& capture, Encoder
         settings.texture.width = settings.texture.height =
             size > 0 ? size : picture_side_of(picture_side_for(*first), plan.encoder.quality);
         note(fmt::format("pictures have {0} x {0} pixels{1}", settings.texture.width,
+                         size > 0 ? "" : "; --texture-size sets others"));
+    } else if (film) {
+        if (!plan.film)
+            return fail(ErrorKind::bad_input,
+                        "--texture-as projection: the first mesh's texture coordinates are not one camera's "
+                        "projection; --texture-as picture takes any");
+        settings.tracked.access_interval = plan.access_interval_with_pictures;
+        const auto pictures =
+            size > 0 ? film_size_of(*plan.film, size) : film_size_at(*plan.film, plan.encoder.quality);
+        settings.texture.width = pictures.width;
+        settings.texture.height = pictures.height;
+        note(fmt::format("pictures have {} x {} pixels, of {} x {} of the film{}", settings.texture.width,
+                         settings.texture.height, plan.film->width, plan.film->height,
                          size > 0 ? "" : "; --texture-size sets others"));
     } else {
         const double scale = size > 0 ? static_cast<double>(size) / std::max(image.width, image.height) : 1;
@@ -85,6 +98,12 @@ double shift_along(UpAxis up, const GlobalShift& shift) {
 }
 
 }  // namespace
+
+std::optional<FilmWindow> film_of(const Capture& capture) {
+    const auto* first = capture.first_textured();
+    if (capture.texture_as() != TextureAs::projection || !first || !is_film(*first)) return std::nullopt;
+    return first_window(*first);
+}
 
 Result<EncoderOptions> settings_for(const EncodePlan& plan, const Capture& capture) {
     auto out = plan.encoder;

@@ -321,6 +321,25 @@ std::string kinds_text(const StreamPictures& totals) {
     return out;
 }
 
+// What the pictures are, for people and for programs.
+const char* layout_text(TextureLayout layout) {
+    return layout == TextureLayout::projection ? "of one camera's film, projected, " : "";
+}
+
+const char* layout_word(TextureLayout layout) {
+    switch (layout) {
+        case TextureLayout::none:
+            break;
+        case TextureLayout::captured:
+            return "captured";
+        case TextureLayout::charts:
+            return "charts";
+        case TextureLayout::projection:
+            return "projection";
+    }
+    return "none";
+}
+
 nlohmann::json audio_json(const AudioTotals& totals) {
     if (totals.packets == 0) return {};
     return {{"coder", "opus"}, {"channels", totals.channels}, {"seconds", totals.seconds()}, {"bytes", totals.bytes}};
@@ -481,6 +500,7 @@ void print_json(const Inspection& in, const StreamInput& input) {
                        {"front_index", found.front ? index_json(*found.front) : nlohmann::json()},
                        {"damaged_bytes", input.damaged_bytes()},
                        {"megabits_per_second", size.megabits_per_second}};
+    if (found.pictures.pictures > 0) out["pictures"]["layout"] = layout_word(sequence.texture.layout);
     if (in.buffer) out["buffer"] = buffer_json(in.options, *in.buffer);
     fmt::print("{}\n", out.dump(2));
 }
@@ -491,6 +511,7 @@ void print_totals(const Inspection& in) {
     const StreamPictures& pictures = found.pictures;
     const PatchedArea& patched = found.patched;
     const auto size = size_of(in);
+    const auto& sequence = found.first_sequence ? *found.first_sequence : *in.headers.sequence();
     if (!in.options.summary)
         fmt::print(
             "bpv: bits per captured vertex, as from pose/transforms on; vertices and triangles: of the decoded "
@@ -503,8 +524,9 @@ void print_totals(const Inspection& in) {
         fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo", audio.seconds(),
                    audio.bytes);
     if (pictures.pictures > 0)
-        fmt::print("pictures: {}, {} of them key pictures, {} bytes, {:.2f} Mbit/s\n", kinds_text(pictures),
-                   pictures.keys, pictures.bytes, 8e-6 * static_cast<double>(pictures.bytes) / size.seconds);
+        fmt::print("pictures: {}{}, {} of them key pictures, {} bytes, {:.2f} Mbit/s\n",
+                   layout_text(sequence.texture.layout), kinds_text(pictures), pictures.keys, pictures.bytes,
+                   8e-6 * static_cast<double>(pictures.bytes) / size.seconds);
     if (patched.patched > 0)
         fmt::print("patches in {} replace {:.2f} % of the surface a T- or TP-frame on average, at most {:.1f} %\n",
                    counted(patched.patched, "TP-frame"), 100 * patched.mean(), 100 * patched.largest);

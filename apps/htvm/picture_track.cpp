@@ -74,6 +74,19 @@ int picture_side_of(int usual_side, double quality) {
     return static_cast<int>(std::clamp(step * std::round(side / step), least, static_cast<double>(most_picture_side)));
 }
 
+PictureSize film_size_of(const FilmWindow& film, int longer_side) {
+    constexpr long least = 16;
+    const double scale = static_cast<double>(longer_side) / std::max(film.width, film.height);
+    const auto side = [&](int pixels) { return static_cast<int>(std::max(least, std::lround(scale * pixels))); };
+    return {side(film.width), side(film.height)};
+}
+
+PictureSize film_size_at(const FilmWindow& film, double quality) {
+    const int side = std::max(film.width, film.height);
+    const int wanted = quality < default_quality ? picture_side_of(side, quality) : side;
+    return film_size_of(film, std::min({wanted, side, static_cast<int>(most_picture_side)}));
+}
+
 Result<PictureTrack> PictureTrack::create(const Settings& settings) {
     PictureTrack out;
     if (settings.keep) return out;
@@ -106,8 +119,9 @@ Result<PictureTrack> PictureTrack::create(const Settings& settings) {
     return out;
 }
 
-void PictureTrack::add(std::int64_t timestamp_us, std::shared_ptr<const TexturedMesh> textured) {
-    waiting_.push_back({timestamp_us, std::move(textured)});
+void PictureTrack::add(std::int64_t timestamp_us, std::shared_ptr<const TexturedMesh> textured,
+                       std::optional<FilmWindow> film) {
+    waiting_.push_back({timestamp_us, std::move(textured), film});
 }
 
 // Meshes take more at times; over a second or so, pictures then take less.
@@ -146,13 +160,18 @@ Result<void> PictureTrack::add_picture(Held& held) {
     while (!waiting_.empty() && waiting_.front().timestamp_us < packet.timestamp_us) waiting_.pop_front();
     if (waiting_.empty() || waiting_.front().timestamp_us != packet.timestamp_us) return {};
     const auto captured = std::move(waiting_.front().textured);
+    const auto film = waiting_.front().film;
     waiting_.pop_front();
     const bool key = is_start(packet, last_key_) || !last_;
-    if (!captured->texture || (!baker_ && captured->texture == last_ && !key)) return {};
+    if (!captured->texture || (!baker_ && !film && captured->texture == last_ && !key)) return {};
     const auto start = std::chrono::steady_clock::now();
     const double baking = totals_.baking_seconds;
     if (baker_) {
         if (auto drawn = draw(held, *captured, key); !drawn) return drawn;
+    } else if (film) {
+        const auto picture = film_picture(*captured, *film, static_cast<int>(width_), static_cast<int>(height_));
+        totals_.baking_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        if (auto coded = code_as_video(held, picture, no_gains, key); !coded) return coded;
     } else if (encoder_) {
         if (auto coded = code_as_video(held, *captured->texture, no_gains, key); !coded) return coded;
     } else {

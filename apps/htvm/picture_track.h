@@ -16,6 +16,7 @@
 #include "htvm/picture_encoder.hpp"
 #include "htvm/result.hpp"
 #include "htvm/texture.hpp"
+#include "texture/film_picture.h"
 #include "texture/texture_baking.h"
 
 namespace CLI {
@@ -50,6 +51,13 @@ int quantiser_of(PictureCoder coder, double quality);
 // at a finer quality loses less to being drawn, and at a coarser one no bits go into pixels that nobody sees.
 int picture_side_of(int usual_side, double quality);
 
+// The size of pictures of a film: with this longer side, or by the quality, the film's own from the default quality on.
+struct PictureSize {
+    int width = 0, height = 0;
+};
+PictureSize film_size_of(const FilmWindow& film, int longer_side);
+PictureSize film_size_at(const FilmWindow& film, double quality);
+
 // What the meshes are given of a rate for both, where one pass has to do.
 inline constexpr double share_of_meshes = 0.5;
 
@@ -79,7 +87,9 @@ public:
     static Result<PictureTrack> create(const Settings& settings);
 
     // The picture of a frame with this timestamp: a later frame without one shows it too.
-    void add(std::int64_t timestamp_us, std::shared_ptr<const TexturedMesh> textured);
+    // film: where the picture is a camera's film, the part of it that is sent.
+    void add(std::int64_t timestamp_us, std::shared_ptr<const TexturedMesh> textured,
+             std::optional<FilmWindow> film = std::nullopt);
     // Whether it wants to know what is shown of each frame, which is drawn on.
     bool bakes() const { return baker_.has_value(); }
     // Before the frame's packet comes. repeated: Encoder::repeated_vertices().
@@ -100,6 +110,7 @@ private:
     struct Waiting {
         std::int64_t timestamp_us;
         std::shared_ptr<const TexturedMesh> textured;
+        std::optional<FilmWindow> film;
     };
     struct Shown {
         Mesh mesh;

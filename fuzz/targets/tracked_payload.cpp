@@ -33,6 +33,11 @@ void check_head(const KnownOfHead& known, fuzz::FuzzInput& input) {
     if (known.colours && input.flag())
         head.colour = any_steps(input, 3, known.before ? known.before->colour.turned : input.flag());
     if (known.before) head.colour.turned = known.before->colour.turned;
+    if (known.projection) {
+        head.projection = known.before ? known.before->projection : *known.projection;
+        if (input.flag())
+            for (auto& c : head.projection.rows) c = static_cast<float>(static_cast<std::int32_t>(input.u32()));
+    }
     head.colour_run = known.colours && input.flag() ? any_count(input) : 0;
     RangeEncoder encoder;
     write_tracked_head(encoder, head, known);
@@ -85,10 +90,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         reference->around = vertices_around(mesh.positions.size(), mesh.triangles);
         if (reference->captured.vertices % 2 == 1) reference->presence.resize(mesh.positions.size());
     }
+    if (reference->captured.triangles % 3 == 1) {
+        reference->projection.emplace();
+        for (auto& c : reference->projection->rows) c = static_cast<float>(static_cast<std::int32_t>(input.u32()));
+    }
     DecodedTrackedFrame last, next;
     const TrackedState* before = nullptr;
     for (int frame = 0; frame < 4; ++frame) {
-        check_head({before ? &before->head : nullptr, reference->captured, !mesh.colours.empty()}, input);
+        check_head({before ? &before->head : nullptr, reference->captured, !mesh.colours.empty(),
+                    reference->projection ? &*reference->projection : nullptr},
+                   input);
         const auto payload = frame < 3 ? input.take(input.u16() % 512) : input.rest();
         check_group(payload);
         if (before) check_between(*reference, *before, payload);
@@ -99,6 +110,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         require(fuzz::all_on_lattice(next.positions), "positions are on the lattice");
         require(next.state.presence.size() == (reference->has_presence ? mesh.positions.size() : 0),
                 "presence of each vertex, where it is told");
+        std::vector<QuantisedTexcoord> places;
+        project(next.state.head.projection, next.positions, places);
+        for (const auto& [u, v] : places)
+            require(u >= 0 && u <= 65536 && v >= 0 && v <= 65536, "places are in the film");
         require(next.shares.total() <= payload.size(), "shares of what there is");
         std::swap(last, next);
         before = &last.state;

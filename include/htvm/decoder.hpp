@@ -84,13 +84,13 @@ struct SequenceInfo {
 struct FrameView {
     FrameInfo info;
     // Frames with the same number have the same triangles and texture coordinates, so these need not be sent to a
-    // graphics card again. T- and P-frames have the number of the I- or TP-frame that is their reference, unless other
-    // vertices of it are there (presence); every other frame has a new one. Never 0; numbers of different decoders are
-    // unrelated.
+    // graphics card again; but with TextureLayout::projection texture coordinates are others in each frame. T- and
+    // P-frames have the number of the I- or TP-frame that is their reference, unless other vertices of it are there
+    // (presence); every other frame has a new one. Never 0; numbers of different decoders are unrelated.
     std::uint32_t topology = 0;
     // The number of the mesh of which a frame may show a part. Frames with the same have the same vertices at the same
-    // places of the arrays, and the same texture coordinates; their triangles are those of that mesh whose three
-    // vertices are there. It is the frame's topology where all vertices are.
+    // places of the arrays, and, but for TextureLayout::projection, the same texture coordinates; their triangles are
+    // those of that mesh whose three vertices are there. It is the frame's topology where all vertices are.
     std::uint32_t reference_topology = 0;
     // One per vertex: 1, or 0 where it is not there. No triangle names such a vertex, and its position is a guess at
     // what nobody saw. Empty: all are there, as in streams before version 7.

@@ -181,7 +181,9 @@ struct EncoderOptions {
     // What the stream says of its pictures, which come beside the encoder's packets. With TextureLayout::charts, for
     // Profile::tracked only, meshes are pushed without texture coordinates and without the seams of any;
     // reconstruction() has coordinates of its own, and the vertices on its seams repeated. Colours then are not coded,
-    // but tracking goes by them.
+    // but tracking goes by them. With TextureLayout::projection, likewise for that profile, they are pushed with their
+    // places in one camera's film as texture coordinates, from which the encoder finds how the camera saw each, and
+    // which it refuses where no camera sees it so; those of places that are not known are below 0.
     StreamTexture texture;
 };
 

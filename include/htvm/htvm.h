@@ -134,7 +134,9 @@ enum {
 const char* htvm_frame_reason_name(uint32_t reason);
 
 /* attributes of a mesh besides positions: bits */
-enum { HTVM_COLOURS = 1, HTVM_NORMALS = 2, HTVM_TEXCOORDS = 4 };
+/* HTVM_MOVING_TEXCOORDS: a decoded frame's texture coordinates are a camera's projection of its positions, and so
+ * others in each frame, whatever its topology. */
+enum { HTVM_COLOURS = 1, HTVM_NORMALS = 2, HTVM_TEXCOORDS = 4, HTVM_MOVING_TEXCOORDS = 8 };
 
 typedef struct htvm_frame_info {
     uint32_t struct_size; /* number of bytes of this struct that were filled in */
@@ -148,11 +150,12 @@ typedef struct htvm_frame_info {
     uint32_t joints, bones;                     /* of its pose */
     uint32_t concealed;                         /* 1: from htvm_decoder_conceal() */
     uint64_t bytes;                             /* of its packet */
-    uint32_t topology; /* frames of a decoder with the same number have the same triangles and texture coordinates; 0
-                          from an encoder */
+    uint32_t topology; /* frames of a decoder with the same number have the same triangles, and but for
+                          HTVM_MOVING_TEXCOORDS the same texture coordinates; 0 from an encoder */
     uint32_t sequence; /* which sequence of the stream it belongs to, as in htvm_sequence_info; 0 from an encoder */
     uint32_t reference_topology; /* frames of a decoder with the same number have the same vertices at the same places
-                                    of the arrays, and the same texture coordinates. It is the topology of a frame that
+                                    of the arrays, and but for HTVM_MOVING_TEXCOORDS the same texture coordinates. It is
+                                    the topology of a frame that
                                     shows all of the mesh; one that shows a part has another topology, and its triangles
                                     are those whose three vertices are there. 0 from an encoder */
     uint32_t absent;   /* how many vertices are not there, as htvm_mesh_view.presence says; 0 from an encoder */
@@ -242,7 +245,8 @@ htvm_status htvm_decoder_unused_bytes(const htvm_decoder* decoder, uint64_t* dam
 typedef struct htvm_mesh_view {
     uint32_t struct_size; /* number of bytes of this struct that were filled in */
     uint32_t vertices, triangles;
-    uint32_t topology;       /* as in htvm_frame_info: if it equals the last frame's, so do indices and texcoords */
+    uint32_t topology;       /* as in htvm_frame_info: if it equals the last frame's, so do indices, and but for
+                                HTVM_MOVING_TEXCOORDS texcoords */
     const float* positions;  /* mm, 3 per vertex */
     const uint32_t* indices; /* 3 per triangle, counter-clockwise seen from outside */
     const uint8_t* colours;  /* red, green, blue per vertex; NULL: the frame has none */
@@ -278,8 +282,8 @@ enum {
     HTVM_UP_MINUS_Z = 6
 };
 
-/* Where texture coordinates come from: none, as captured, the stream's own charts. */
-enum { HTVM_TEXTURE_NONE = 0, HTVM_TEXTURE_CAPTURED = 1, HTVM_TEXTURE_CHARTS = 2 };
+/* Where texture coordinates come from: none, as captured, the stream's own charts, one camera's projection. */
+enum { HTVM_TEXTURE_NONE = 0, HTVM_TEXTURE_CAPTURED = 1, HTVM_TEXTURE_CHARTS = 2, HTVM_TEXTURE_PROJECTION = 3 };
 
 typedef struct htvm_sequence_info {
     uint32_t struct_size; /* number of bytes of this struct that were filled in */

@@ -8,10 +8,11 @@
 namespace htvm {
 
 enum class TextureLayout : std::uint8_t {
-    none,      // the stream has no texture
-    captured,  // the meshes have the capture's own texture coordinates
-    charts,    // the stream has a layout of its own: each reference's surface is cut into a few large charts, each
-               // projected onto a plane
+    none,        // the stream has no texture
+    captured,    // the meshes have the capture's own texture coordinates
+    charts,      // the stream has a layout of its own: each reference's surface is cut into a few large charts, each
+                 // projected onto a plane
+    projection,  // the pictures are one camera's film: each frame says how that camera saw its surface
 };
 
 // What the sequence header says of a stream's texture.

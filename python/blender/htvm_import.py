@@ -57,6 +57,7 @@ class Reader:
 
 readers = {}  # by path and time of its last change: a file that was written anew is read anew
 shown = {}  # of each mesh, by its name, the array of triangles that it was made of
+placed = {}  # likewise the array of texture coordinates
 failures = {}  # of each object, by its name, what was printed last
 
 
@@ -74,7 +75,8 @@ def fill(mesh, frame):
     """Makes the Blender mesh the frame's. Frames of one topology share their array of triangles, if all of it is there."""
     frame = frame.shown()
     n, m = len(frame.positions), len(frame.triangles)
-    if shown.get(mesh.name) is not frame.triangles or (len(mesh.vertices), len(mesh.polygons)) != (n, m):
+    anew = shown.get(mesh.name) is not frame.triangles or (len(mesh.vertices), len(mesh.polygons)) != (n, m)
+    if anew:
         mesh.clear_geometry()
         mesh.vertices.add(n)
         mesh.loops.add(3 * m)
@@ -84,9 +86,11 @@ def fill(mesh, frame):
         if bpy.app.version < (3, 6, 0):  # later versions know it from where the next one starts
             mesh.polygons.foreach_set("loop_total", np.full(m, 3, np.int32))
         mesh.polygons.foreach_set("use_smooth", np.ones(m, bool))
-        if frame.texcoords is not None:
-            layer = mesh.uv_layers.new(name="UVMap")
-            layer.data.foreach_set("uv", frame.texcoords[frame.triangles].ravel())
+    # Those of a camera's film are others in each frame.
+    if frame.texcoords is not None and (anew or placed.get(mesh.name) is not frame.texcoords):
+        layer = mesh.uv_layers.get("UVMap") or mesh.uv_layers.new(name="UVMap")
+        layer.data.foreach_set("uv", frame.texcoords[frame.triangles].ravel())
+        placed[mesh.name] = frame.texcoords
     mesh.vertices.foreach_set("co", frame.positions.ravel())
     if frame.colours is not None:
         attribute = mesh.color_attributes.get("Color")
@@ -125,6 +129,7 @@ def show_all(scene, *_):
 def forget(*_):
     """Meshes are no longer what was shown."""
     shown.clear()
+    placed.clear()
 
 
 @persistent

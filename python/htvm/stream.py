@@ -52,7 +52,9 @@ class Frame(Mesh):
     kind: str = ""  # "I", "EP", "P", "T" or "TP": docs/glossary.md
     reason: Optional[str] = None  # why an I- or TP-frame was sent, "due" or "region": docs/bitstream.md, 8.20; None: not told
     bytes: int = 0  # of its packet
-    topology: int = 0  # of frames of one iteration, the same if they have the same triangles and texcoords
+    # Of frames of one iteration, the same if they have the same triangles and texcoords; but where the texture is one
+    # camera's film, each frame has texcoords of its own.
+    topology: int = 0
     reference_topology: int = 0  # likewise, the same if they have the same vertices and texcoords
     presence: Optional[NDArray[np.bool_]] = None  # (n,): which vertices are there; None: all. The others are in no triangle
     joints: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))  # (j, 3), millimetres
@@ -308,7 +310,8 @@ class _Decoder:
         else:
             triangles = copied(view.indices, view.triangles, 3, np.uint32)
             triangles.flags.writeable = False
-        if last is not None and last.reference_topology == info.reference_topology:
+        moving = info.attributes & c.HTVM_MOVING_TEXCOORDS
+        if last is not None and last.reference_topology == info.reference_topology and not moving:
             texcoords = last.texcoords
         else:
             texcoords = copied_attribute(view.texcoords, n, 2, np.float32)

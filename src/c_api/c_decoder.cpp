@@ -15,7 +15,8 @@ static_assert(HTVM_UP_UNKNOWN == static_cast<int>(htvm::UpAxis::unknown) &&
               HTVM_UP_MINUS_Z == static_cast<int>(htvm::UpAxis::minus_z));
 static_assert(HTVM_TEXTURE_NONE == static_cast<int>(htvm::TextureLayout::none) &&
               HTVM_TEXTURE_CAPTURED == static_cast<int>(htvm::TextureLayout::captured) &&
-              HTVM_TEXTURE_CHARTS == static_cast<int>(htvm::TextureLayout::charts));
+              HTVM_TEXTURE_CHARTS == static_cast<int>(htvm::TextureLayout::charts) &&
+              HTVM_TEXTURE_PROJECTION == static_cast<int>(htvm::TextureLayout::projection));
 
 using htvm::c_api::check_struct;
 using htvm::c_api::guarded;
@@ -80,6 +81,10 @@ htvm_status no_frame(LastError& error) {
 htvm_status describe_current(htvm_decoder& decoder, htvm_frame_info* info, std::size_t info_size) {
     const auto& frame = *decoder.current;
     auto out = htvm::c_api::describe(frame.info, htvm::c_api::attributes_of(frame.mesh));
+    const auto& sequence = decoder.decoder.sequence();
+    if ((out.attributes & HTVM_TEXCOORDS) != 0 && sequence &&
+        sequence->texture.layout == htvm::TextureLayout::projection)
+        out.attributes |= HTVM_MOVING_TEXCOORDS;
     out.joints = static_cast<std::uint32_t>(frame.pose->joints.size());
     out.bones = static_cast<std::uint32_t>(frame.pose->orientations.size());
     out.topology = frame.topology;

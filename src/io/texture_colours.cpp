@@ -117,10 +117,10 @@ std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, T
     return out;
 }
 
-std::vector<Colour> colours_with_texture(const TexturedMesh& captured, Threads threads) {
+std::vector<Colour> colours_with_texture(const TexturedMesh& captured, Threads threads, double spacing) {
     std::vector<Colour> out;
     out.reserve(captured.mesh.positions.size());
-    for (const auto& sum : sums_with_own_colours(captured, threads, 1)) out.push_back(mean_of(sum));
+    for (const auto& sum : sums_with_own_colours(captured, threads, spacing)) out.push_back(mean_of(sum));
     return out;
 }
 

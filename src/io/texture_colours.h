@@ -16,7 +16,9 @@ namespace htvm {
 std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, internal::Threads threads = {});
 
 // The same of a mesh as texture_file.h reads it, multiplied, in light, by the colours that its vertices have.
-std::vector<Colour> colours_with_texture(const TexturedMesh& captured, internal::Threads threads = {});
+// spacing: as of with_vertex_colours().
+std::vector<Colour> colours_with_texture(const TexturedMesh& captured, internal::Threads threads = {},
+                                         double spacing = 1);
 
 // The mesh with these colours in place of the texture and its coordinates, multiplied, in light, by those that its
 // vertices have, as glTF means both together; where they are not meant so, texture_file.h leaves them out. Vertices at

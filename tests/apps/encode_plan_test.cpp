@@ -79,7 +79,9 @@ TEST(Contradictions, WhatTheEncoderDoesNotTakeTogetherIsSaidInFlags) {
 }
 
 TEST(Contradictions, SettingsOfVideoNeedPicturesThatAreCodedAsVideo) {
-    const std::string advice = ": is for pictures that are coded as video: add --texture-as picture or captured";
+    const std::string advice =
+        ": is for pictures that are coded as video: add --texture-as picture, projection or "
+        "captured";
     auto request = usual();
     request.pictures.size = 512;
     EXPECT_EQ(contradiction_in(request), "");  // pictures are what images become

@@ -1,8 +1,8 @@
 // Streams that every version must decode to the same integers, each with a digest per frame: *.htvm and *.digests in
 // tests/data/conformance. Those whose names have no number are of the stream's version 1, NAME_2 and NAME_3 of versions
 // 2 and 3, and no encoder writes them any more; NAME_4 are of version 4, NAME_5 of 5, NAME_6 of 6,
-// NAME_7 of 7. HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of versions 4 to 7 that are there; NAME_4
-// writes that one, whether it is there or not.
+// NAME_7 of 7, NAME_8 of 8. HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of versions 4 to 8 that are there;
+// NAME_4 writes that one, whether it is there or not.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,6 +15,7 @@
 #include <optional>
 
 #include "codec/enhanced_options.h"
+#include "codec/filmed_sequences.h"
 #include "codec/format/sequence.h"
 #include "codec/levels_by_chance.h"
 #include "codec/moving_sequences.h"
@@ -435,6 +436,17 @@ void write_levels_by_chance() {
     write_packets("levels_by_chance", with_presence(packets, 1500, motion, 7));
 }
 
+// One camera's film, of a camera that moves in some frames: T-frames in groups and alone, a patch, frames that refer to
+// the reference; with levels of detail.
+void write_projection() {
+    auto sequence = filmed(horned_ball(6, 4));
+    const auto moving = filmed(horned_ball(9, 4), 15);
+    sequence.frames.insert(sequence.frames.end(), moving.frames.begin() + 6, moving.frames.end());
+    auto options = filmed_options();
+    options.tracked.group = 2;
+    write_stream("projection", sequence, options);
+}
+
 void write_all() {
     fs::create_directories(folder);
     write_levels();
@@ -451,6 +463,7 @@ void write_all() {
     write_grouped();
     write_charts();
     write_presence();
+    write_projection();
     write_reasons();
     write_sequences();
 

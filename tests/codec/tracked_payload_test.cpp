@@ -24,6 +24,7 @@ TrackedHead any_head(std::mt19937& random, bool colours) {
     out.captured = {any_count(random), any_count(random)};
     out.motion = {static_cast<int>(below(random, 11)), static_cast<int>(below(random, 21))};
     out.displacement.step[0] = any_step(random);
+    for (auto& c : out.projection.rows) c = static_cast<float>(below(random, 1000000)) / 999 - 500;
     if (!colours) return out;
     out.colour.turned = below(random, 2) == 0;
     for (auto& step : out.colour.step) step = any_step(random);
@@ -49,7 +50,9 @@ TEST(TrackedHead, OfAnyNumbersComesBackWithAndWithoutColoursAndAFrameBefore) {
         const bool colours = i % 2 == 0;
         const auto before = any_head(random, colours);
         auto head = any_head(random, colours);
-        KnownOfHead known{nullptr, {any_count(random), any_count(random)}, colours};
+        const auto of_reference = any_head(random, colours).projection;
+        KnownOfHead known{nullptr, {any_count(random), any_count(random)}, colours, &of_reference};
+        if (below(random, 4) == 0) head.projection = of_reference;
         EXPECT_EQ(read(written(head, known), known).value(), head);
         known.before = &before;
         head.colour.turned = before.colour.turned;
@@ -57,6 +60,7 @@ TEST(TrackedHead, OfAnyNumbersComesBackWithAndWithoutColoursAndAFrameBefore) {
         if (below(random, 3) == 0) head.motion = before.motion;
         if (below(random, 3) == 0) head.displacement = before.displacement;
         if (below(random, 3) == 0) head.colour = before.colour;
+        if (below(random, 3) == 0) head.projection = before.projection;
         EXPECT_EQ(read(written(head, known), known).value(), head);
     }
 }
@@ -66,7 +70,7 @@ TEST(TrackedHead, ThatIsAsBeforeTakesAByteAndOneOfAnotherCaptureAsManyMoreAsItsC
     before.captured = {26000, 52000};
     before.displacement.step[0] = 4506;
     before.colour = {true, {8730, 8730, 8730}};
-    const KnownOfHead known{&before, {}, true};
+    const KnownOfHead known{&before, {}, true, &before.projection};
     EXPECT_LE(written(before, known).size(), 1u);
     auto head = before;
     head.captured = {26400, 52800};  // two triangles for each vertex, as on a closed surface

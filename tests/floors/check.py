@@ -60,6 +60,7 @@ FLOORS = [
     ("src/texture", ["core", "htvm/picture_planes.hpp", "htvm/picture_encoder.hpp", "htvm/picture_decoder.hpp"]),
     ("src/texture/texture_baking.cpp", ["core", "surface"]),
     ("src/texture/surface_matches.cpp", ["core", "surface"]),
+    ("src/texture/film_picture.cpp", ["core", "surface"]),
     ("src/container", ["core", "codec/format", "htvm/decoder.hpp"]),
     ("src/synth", ["core"]),
     ("src/metrics", ["core"]),

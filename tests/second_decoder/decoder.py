@@ -7,6 +7,7 @@ program: the order of packets (chapter 2) and the digest (chapter 12); the other
 Section numbers in the comments are the document's. Python 3.8 or later, standard library only. I-frames that Draco
 coded are not decoded.
 """
+import copy
 import os
 import struct
 import sys
@@ -24,6 +25,7 @@ from reference import Reference, decode_pose
 from patched import decode_patched_mesh
 from picture import Pictures
 from presence import decode_presence_layer, shown
+from projection import decode_projection_layer, texcoords
 from stream import (AUDIO, CHARTS, CODEBOOK, ENHANCED, INTRA, PATCHED, PICTURE, POSE, PREDICTED, PRESENCE, SEQUENCE, TRACKED,
                     packets, read_coded_frame, read_frame_payload, read_sequence_header)
 from tracked import TrackedReference, decode_tracked_mesh
@@ -60,6 +62,14 @@ def intra_presence(header, packet, frame, mesh):
     return decode_presence_layer(frame.layer(PRESENCE), vertices, mesh.triangles)
 
 
+def intra_projection(header, frame, mesh):
+    """How the camera saw an I-frame (6.10), or None."""
+    if header.layout != 3 or CHARTS not in frame.layers:
+        return None
+    check(not mesh.texcoords, "it has both a projection and texture coordinates")
+    return decode_projection_layer(frame.layer(CHARTS))
+
+
 LEVELED = 2  # an intra coder
 
 
@@ -71,18 +81,29 @@ def intra_mesh(frame):
     return decode_intra_mesh(frame), frame.geometry_step, None
 
 
+def projected(mesh, projection):
+    """The mesh with the texture coordinates of its frame's projection (6.10), if it has one."""
+    if projection is None:
+        return mesh
+    out = copy.copy(mesh)
+    out.texcoords = texcoords(projection, mesh.positions)
+    return out
+
+
 class Group:
     """An I- or TP-frame and what T-frames make of it (8.11). presence: None before version 7. detail: of the mesh
-    (6.9), or None."""
+    (6.9), or None. projection: of the frame (6.10), or None."""
 
-    def __init__(self, mesh, frame, number, step=1, kept=Kept(), textured=None, presence=None, detail=None):
+    def __init__(self, mesh, frame, number, step=1, kept=Kept(), textured=None, presence=None, detail=None,
+                 projection=None):
         self.mesh, self.frame, self.number, self.step, self.kept = mesh, frame, number, step, kept
-        self.textured, self.presence, self.detail = textured, presence, detail
+        self.textured, self.presence, self.detail, self.projection = textured, presence, detail, projection
         self.reference = self.state = self.last = self.group = None
 
-    def shown(self, mesh, presence):
-        """A mesh of its vertices, as it is shown. presence: None before version 7."""
+    def shown(self, mesh, presence, projection):
+        """A mesh of its vertices, as it is shown. presence: None before version 7. projection: of its frame."""
         mesh, presence = with_detail(self.detail, mesh, presence)
+        mesh = projected(mesh, projection)
         if self.textured:
             mesh = self.textured.show(mesh)
         return mesh if presence is None else shown(mesh, presence, self.textured.copied if self.textured else ())
@@ -90,13 +111,13 @@ class Group:
     def tracked_reference(self, header):
         check(header.node_spacing > 0, "the header allows no tracked frames")
         self.reference = self.reference or TrackedReference(
-            self.mesh, self.frame.captured, self.step, header.node_spacing, self.kept, self.presence)
+            self.mesh, self.frame.captured, self.step, header.node_spacing, self.kept, self.presence, self.projection)
         return self.reference
 
     def decode(self, packet, header):
         """The mesh of a T-frame, as it is shown."""
         mesh, state = self.decode_tracked(packet, header)
-        return self.shown(mesh, state.presence if header.version >= 7 else None)
+        return self.shown(mesh, state.presence if header.version >= 7 else None, getattr(state, "projection", None))
 
     def decode_tracked(self, packet, header):
         if header.version < 5:
@@ -133,7 +154,7 @@ class Group:
         check(packet.referred(), "a patched frame that nothing may refer to")
         frame = read_coded_frame(packet)
         joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
-        mesh, presence, stay, kept = decode_patched_mesh(frame, self.tracked_reference(header))
+        mesh, presence, stay, kept, projection = decode_patched_mesh(frame, self.tracked_reference(header))
         detail = detail_that_stays(self.detail, len(self.mesh.positions), stay, mesh)
         textured = None
         if self.textured:
@@ -141,7 +162,8 @@ class Group:
             before = [corners for triangle, corners in zip(self.mesh.triangles, self.textured.corners)
                       if stays.issuperset(triangle)]
             textured = textured_surface(header, frame, mesh, detail, before)
-        group = Group(mesh, frame, packet.frame, kept=kept, textured=textured, presence=presence, detail=detail)
+        group = Group(mesh, frame, packet.frame, kept=kept, textured=textured, presence=presence, detail=detail,
+                      projection=projection)
         return mesh, joints, group
 
 
@@ -182,10 +204,12 @@ def decode_stream(data):
                     step = 1
                 textured = textured_surface(header, frame, mesh, detail)
                 presence = intra_presence(header, packet, frame, mesh)
-                own = Group(mesh, frame, packet.frame, step, textured=textured, presence=presence, detail=detail)
+                projection = intra_projection(header, frame, mesh)
+                own = Group(mesh, frame, packet.frame, step, textured=textured, presence=presence, detail=detail,
+                            projection=projection)
                 if packet.referred():
                     reference, books, group = Reference(mesh, joints, header, packet.frame), [None, None], own
-                yield packet, header, own.shown(mesh, presence)
+                yield packet, header, own.shown(mesh, presence, projection)
             elif packet.kind == TRACKED:
                 check(group, "its reference is not there")
                 yield packet, header, group.decode(packet, header)
@@ -193,16 +217,18 @@ def decode_stream(data):
                 check(group, "its reference is not there")
                 mesh, joints, group = group.decode_patched(packet, header)
                 reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
-                yield packet, header, group.shown(mesh, group.presence)
+                yield packet, header, group.shown(mesh, group.presence, group.projection)
             elif packet.kind in (ENHANCED, PREDICTED):
                 check(header, "a frame came before any sequence header")
                 check(reference and reference.frame == packet.reference, "its reference is not there")
                 if packet.kind == PREDICTED:
                     frame = read_frame_payload(packet.payload)
-                    yield packet, header, group.shown(decode_predicted_mesh(frame, reference), group.presence)
+                    mesh = decode_predicted_mesh(frame, reference)
+                    yield packet, header, group.shown(mesh, group.presence, group.projection)
                 else:
                     frame = read_coded_frame(packet)
-                    yield packet, header, decode_enhanced_mesh(frame, reference, books, header.m)
+                    yield packet, header, projected(decode_enhanced_mesh(frame, reference, books, header.m),
+                                                    group.projection)
         except (Corrupt, Unsupported) as error:
             yield packet, None, error
 

@@ -67,6 +67,7 @@ def state_between(reference, earlier, later, above, step):
         else:
             largest, others = a.largest, [mixed(x, y) for x, y in zip(a.others, b.others)]
         out.transforms.append(Transform(largest, others, tuple(mixed(x, y) for x, y in zip(a.shift, b.shift))))
+    out.projection = earlier.projection if earlier else reference.projection
     if reference.presence is not None:
         out.presence = presence_between(earlier.presence if earlier else reference.presence, later.presence)
     out.displacement = FieldBetween(earlier and earlier.displacement, later.displacement, mixed)

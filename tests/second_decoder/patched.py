@@ -88,7 +88,8 @@ def decode_places(data, triangles, vertices, border):
 
 
 def decode_patched_mesh(frame, reference):
-    """The mesh, its presence, the vertices that stay, and what it takes over of the reference's nodes. frame: its payload."""
+    """The mesh, its presence, the vertices that stay, what it takes over of the reference's nodes, and its projection.
+    frame: its payload."""
     check(not reference.mesh.texcoords, "its reference has texture coordinates")
     tracked, state = decode_tracked_mesh(frame.layer(TRACKED_RUN), 4, reference, None)
     removed = decode_removed(frame.layer(REMOVED), len(tracked.positions), reference.levels)
@@ -127,4 +128,4 @@ def decode_patched_mesh(frame, reference):
     presence = None
     if reference.presence is not None:
         presence = presence_of_patched(state.presence, stay, len(mesh.positions))
-    return mesh, presence, stay, Kept(reference.nodes, stay)
+    return mesh, presence, stay, Kept(reference.nodes, stay), state.projection

@@ -58,8 +58,8 @@ def read_sequence_header(payload):
     header = Header()
     check(read.take(4) == b"htvm", "this is no htvm stream")
     version = read.field("H")
-    if not 1 <= version <= 7:
-        raise Unsupported("version %d; this decoder reads 1 to 7" % version)
+    if not 1 <= version <= 8:
+        raise Unsupported("version %d; this decoder reads 1 to 8" % version)
     header.version = version
     header.bits = read.field("B")
     header.origin = [read.field("i") for _ in range(3)]
@@ -97,7 +97,7 @@ def read_sequence_header(payload):
     header.layout, header.picture = 0, (0, 0)
     if version >= 6:
         header.layout, header.picture = read.varint(), (read.varint(), read.varint())
-        if header.layout > 2:
+        if header.layout > (3 if version >= 8 else 2):
             raise Unsupported("texture layout %d" % header.layout)
         sizes = range(1, 4097) if header.layout > 0 else [0]
         check(all(side in sizes for side in header.picture), "the size of the pictures is out of range")

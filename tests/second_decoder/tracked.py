@@ -10,22 +10,23 @@ from intra import Mesh
 from node_motion import decode_node_motion, decode_node_motion_layer
 from nodes import Nodes, averaged
 from presence import decode_presence, neighbours
+from projection import decode_projection
 from reference import matrix
 from stream import COLOUR, GEOMETRY, TRANSFORMS, read_frame_payload
 
 
 class TrackedReference:
     """What all T-frames of an I- or TP-frame share. step: of its positions, 1 if they were smoothed. presence: per vertex,
-    None before version 7."""
+    None before version 7. projection: of its frame (6.10), or None."""
 
-    def __init__(self, mesh, captured, step, spacing, kept, presence):
+    def __init__(self, mesh, captured, step, spacing, kept, presence, projection=None):
         self.mesh, self.captured = mesh, captured
         self.positions = averaged(mesh.positions, mesh.triangles, step)
         self.nodes = Nodes(self.positions, mesh.triangles, spacing, kept)
         normals = normals_of(self.positions, mesh.triangles)
         self.node_normals = [normals[v] for v in self.nodes.vertices]
         self.levels = vertex_hierarchy(self.positions, mesh.triangles)
-        self.presence = presence
+        self.presence, self.projection = presence, projection
         self.around = neighbours(len(mesh.positions), mesh.triangles) if presence is not None else None
 
 
@@ -119,6 +120,9 @@ def decode_run(payload, reference, before):
         state.steps = before.steps
     else:
         state.steps = decode_steps(decoder, 1)
+    state.projection = None
+    if reference.projection:
+        state.projection = decode_projection(decoder, before.projection if before else reference.projection)
     if reference.mesh.colours:
         if before and decoder.raw(1):
             state.turned, state.change_steps = before.turned, before.change_steps

@@ -30,7 +30,7 @@ namespace Htvm
             Turn(frame.Positions, vertices, count, up, 0.001f);
             Mesh.SetVertices(vertices, 0, count);
             if (frame.Has(Attributes.Colours)) ShowColours(frame.Colours, count);
-            if (frame.Has(Attributes.Texcoords) && (triangles || frame.ReferenceChanged)) ShowTexcoords(frame.Texcoords, count);
+            if (frame.Has(Attributes.Texcoords) && (triangles || frame.ReferenceChanged || frame.Has(Attributes.MovingTexcoords))) ShowTexcoords(frame.Texcoords, count);
             if (triangles) ShowTriangles(frame);
             Mesh.bounds = BoundsOf(frame);
             if (frame.Has(Attributes.Normals))

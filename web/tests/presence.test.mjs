@@ -54,6 +54,19 @@ test('triangles are sent for each topology, texture coordinates for each referen
     assert.deepEqual(reports.map(({ texcoords }) => texcoords !== null), [true, false, false, false, true]);
 });
 
+test('texture coordinates that move are sent and uploaded with each frame', () => {
+    const moving = (at) => ({ ...part(), texcoords: Float32Array.from([0, 0, 1, 0, 0, 1, at, at]), movingTexcoords: true });
+    const reports = send(moving(0.25), moving(0.5), moving(0.75));
+    assert.deepEqual(reports.map(({ texcoords }) => texcoords?.[7]), [0.25, 0.5, 0.75]);
+    assert.deepEqual(reports.map(({ indices }) => indices?.length ?? null), [3, null, null]);
+    const mesh = new HtvmMesh();
+    for (const report of reports) {
+        mesh.setFrame(report);
+        assert.equal(mesh.geometry.attributes.uv.array[7], report.texcoords[7]);
+    }
+    assert.equal(mesh.uploads.indices, 1);
+});
+
 test('a frame that is left out hands on the texture coordinates of the next, whose triangles are others', () => {
     const queue = new FrameQueue({ done() {}, pictureSettled() {}, notice() {} });
     for (const [at, report] of send(whole(), part()).entries()) {

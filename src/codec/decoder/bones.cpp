@@ -34,13 +34,18 @@ Pose moved_pose(const DecoderState& state, std::span<const QuantisedTransform> t
     return pose;
 }
 
-// Connectivity, colours and texture coordinates are those of the I-frame, and so are what is there and the detail.
+const FilmProjection* projection_of(const DecoderState& state) {
+    return state.reference->projection ? &*state.reference->projection : nullptr;
+}
+
+// Connectivity, colours and texture coordinates are those of the I-frame, and so are what is there, the detail and the
+// camera's place.
 void show_animated(DecoderState& state, const AnimatedFrame& frame) {
     const auto& mesh = state.reference->mesh();
     const auto& presence = state.reference->presence;
     show(state,
          {frame.positions, mesh.triangles, mesh.colours, frame.normals, mesh.texcoords, &state.reference->textured,
-          presence, &state.reference->detail},
+          presence, &state.reference->detail, projection_of(state)},
          state.reference_topology, moved_pose(state, frame.transforms));
 }
 
@@ -70,7 +75,9 @@ Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const Fr
         return fail(ErrorKind::limit, "frame " + std::to_string(packet.frame) +
                                           " has more vertices or triangles than this decoder accepts; raise its "
                                           "max_vertices or max_triangles");
-    show(state, view_of(decoded->mesh), new_topology(state), moved_pose(state, history.transforms));
+    auto shown = view_of(decoded->mesh);
+    shown.projection = projection_of(state);
+    show(state, shown, new_topology(state), moved_pose(state, history.transforms));
     state.shown.own = std::move(decoded->mesh);
     return {};
 }

@@ -128,7 +128,11 @@ void show(DecoderState& state, const LatticeMeshView& coded, std::uint32_t refer
     shown.topology = 0;
     to_millimetres(mesh.positions, lattice, shown.positions);
     to_unit_normals(mesh.normals, shown.normals);
-    if (shown.texcoords_topology != reference_topology) {
+    if (mesh.projection) {
+        shown.texcoords_topology = 0;
+        project(*mesh.projection, mesh.positions, shown.projected);
+        to_texcoords(shown.projected, chart_texcoord_unit, shown.texcoords);
+    } else if (shown.texcoords_topology != reference_topology) {
         shown.texcoords_topology = 0;
         if (textured)
             to_texcoords(textured->texcoords, chart_texcoord_unit, shown.texcoords);
@@ -175,6 +179,17 @@ Result<TexturedSurface> read_charts(const DecoderState& state, const FramePayloa
                                           std::to_string(out->texcoords.size()) +
                                           " vertices, more than this decoder accepts; raise its max_vertices");
     return out;
+}
+
+Result<std::optional<FilmProjection>> read_projection(const DecoderState& state, const FramePayloadView& payload,
+                                                      const LatticeMesh& mesh) {
+    using Read = std::optional<FilmProjection>;
+    if (state.header->texture.layout != TextureLayout::projection || !payload.has(Layer::charts)) return Read();
+    if (!mesh.texcoords.empty())
+        return fail(ErrorKind::corrupt_stream, "a frame that has both a projection and texture coordinates");
+    const auto read = read_projection_layer(payload.of(Layer::charts));
+    if (!read) return tl::unexpected(read.error());
+    return Read(*read);
 }
 
 Result<void> check_reference(const DecoderState& state, const Packet& packet) {

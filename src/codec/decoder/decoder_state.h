@@ -26,9 +26,10 @@ struct LatticeMeshView {
     std::span<const Colour> colours;
     std::span<const QuantisedNormal> normals;
     std::span<const QuantisedTexcoord> texcoords;
-    const TexturedSurface* textured = nullptr;  // how it is shown where the stream has charts
-    std::span<const std::uint8_t> presence{};   // one per vertex, or none: all are there
-    const SurfaceDetail* detail = nullptr;      // that it is shown with
+    const TexturedSurface* textured = nullptr;   // how it is shown where the stream has charts
+    std::span<const std::uint8_t> presence{};    // one per vertex, or none: all are there
+    const SurfaceDetail* detail = nullptr;       // that it is shown with
+    const FilmProjection* projection = nullptr;  // that gives its texture coordinates; null: none does
 };
 inline LatticeMeshView view_of(const LatticeMesh& mesh, const TexturedSurface* textured = nullptr) {
     return {mesh.positions, mesh.triangles, mesh.colours, mesh.normals, mesh.texcoords, textured};
@@ -39,6 +40,7 @@ inline LatticeMeshView view_of(const Reference& reference) {
     auto out = view_of(reference.mesh(), &reference.textured);
     out.presence = reference.presence;
     out.detail = &reference.detail;
+    if (reference.projection) out.projection = &*reference.projection;
     return out;
 }
 
@@ -50,7 +52,8 @@ struct ShownFrame {
     std::vector<Vector3f> positions;
     std::vector<Vector3f> normals;
     std::vector<Vector2f> texcoords;
-    std::uint32_t texcoords_topology = 0;  // reference_topology of the frame they belong to
+    std::uint32_t texcoords_topology = 0;      // reference_topology of the frame they belong to; 0: of that frame alone
+    std::vector<QuantisedTexcoord> projected;  // the same before they were floats, where they are a projection's
     std::span<const Triangle> triangles;
     std::span<const Colour> colours;
     std::vector<Colour> own_colours;      // where vertices are repeated
@@ -104,6 +107,7 @@ struct UnreferredIntra {
     LatticeMesh mesh;
     SurfaceDetail detail;
     TexturedSurface textured;
+    std::optional<FilmProjection> projection;
     Pose pose;
 };
 
@@ -144,6 +148,10 @@ void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t refere
 // the coordinates of the first triangles, which a TP-frame keeps.
 Result<TexturedSurface> read_charts(const DecoderState& state, const FramePayloadView& payload, const LatticeMesh& mesh,
                                     const SurfaceDetail& detail, std::vector<CornerTexcoords> before = {});
+
+// How the camera saw an I-frame; nothing if the stream's texture is no film, or the frame does not say it.
+Result<std::optional<FilmProjection>> read_projection(const DecoderState& state, const FramePayloadView& payload,
+                                                      const LatticeMesh& mesh);
 
 // An error if the packet does not refer to the current I-frame.
 Result<void> check_reference(const DecoderState& state, const Packet& packet);

@@ -37,6 +37,7 @@ Result<IntraMesh> decode_mesh(const DecoderState& state, const Packet& packet, c
 LatticeMeshView view_of(const UnreferredIntra& intra) {
     auto out = view_of(intra.mesh, &intra.textured);
     out.detail = &intra.detail;
+    if (intra.projection) out.projection = &*intra.projection;
     return out;
 }
 
@@ -56,6 +57,8 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     auto& [mesh, detail, step] = *decoded;
     auto textured = read_charts(state, payload, mesh, detail);
     if (!textured) return tl::unexpected(textured.error());
+    const auto projection = read_projection(state, payload, mesh);
+    if (!projection) return tl::unexpected(projection.error());
     if (!detail.empty() && !mesh.texcoords.empty())
         return fail(ErrorKind::corrupt_stream, "I-frame: a mesh with detail that has texture coordinates");
     Presence presence;
@@ -67,8 +70,8 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     if (!referred) {
-        UnreferredIntra unreferred{packet.frame,         topology,        std::move(mesh), std::move(detail),
-                                   std::move(*textured), std::move(shown)};
+        UnreferredIntra unreferred{packet.frame,         topology,    std::move(mesh), std::move(detail),
+                                   std::move(*textured), *projection, std::move(shown)};
         show(state, view_of(unreferred), topology, unreferred.pose);
         state.unreferred = std::move(unreferred);
         return {};
@@ -81,7 +84,8 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
                          .captured = {payload.header.source_vertices, payload.header.source_triangles},
                          .textured = std::move(*textured),
                          .presence = std::move(presence),
-                         .detail = std::move(detail)};
+                         .detail = std::move(detail),
+                         .projection = *projection};
     auto reference = make_reference(header, std::move(facts), std::move(mesh), std::move(*pose),
                                     {.bones = false, .nodes = false}, state.threads);
     if (!reference) return tl::unexpected(reference.error());

@@ -50,6 +50,7 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
                          .textured = std::move(*textured),
                          .presence = std::move(presence),
                          .detail = std::move(detail)};
+    if (reference.projection) facts.projection = tracked.state.head.projection;
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     // Its nodes are for the next frame to derive, or for the time between, so that no frame has to do the work of two.

@@ -39,7 +39,8 @@ void show_tracked(DecoderState& state, const DecodedTrackedFrame& frame, Pose po
     const auto& mesh = state.reference->mesh();
     show(state,
          {frame.positions, mesh.triangles, frame.colours, frame.normals, mesh.texcoords, &state.reference->textured,
-          frame.state.presence, &state.reference->detail},
+          frame.state.presence, &state.reference->detail,
+          state.reference->projection ? &frame.state.head.projection : nullptr},
          state.reference_topology, std::move(pose));
 }
 

@@ -24,6 +24,7 @@ ShownMesh shown(CodedFrame& frame, const Reference* reference) {
     const auto& textured = own ? frame.textured : reference->textured;
     const auto& detail = detail_of(frame, reference);
     ShownMesh out{shown_mesh(detailed(detail, std::move(frame.decoded)), textured), textured.copied};
+    if (frame.projection) project(*frame.projection, out.mesh.positions, out.mesh.texcoords);
     if (!anything_absent(frame.presence)) return out;
     auto presence = frame.presence;
     add_detail(detail, detail.levels.size(), presence);

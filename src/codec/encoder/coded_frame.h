@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "codec/encoder/configuration.h"
 #include "codec/format/frame_payload.h"
+#include "codec/reference/film_projection.h"
 #include "codec/reference/node_reference.h"
 #include "codec/reference/reference.h"
 #include "codec/reference/textured_surface.h"
@@ -25,6 +27,7 @@ struct CapturedFrame {
     LatticeMesh mesh;
     std::vector<Colour> colours;  // of its vertices where they serve tracking but are not coded; or none
     CodedPose pose;
+    std::optional<FilmProjection> projection;  // how the camera saw it, where the texture is its film
     std::int64_t timestamp_us = 0;
     bool force_intra = false;
     bool force_access = false;              // Encoder::request_access()
@@ -43,12 +46,13 @@ struct CodedFrame {
     LatticeMesh decoded;           // the mesh that the decoder will have, without detail and the seams of charts
     Presence presence;             // what of it is there; none: all is
     TexturedSurface textured;      // I, TP: of `decoded`, if the stream has charts
-    SurfaceDetail detail;          // I, TP: of `decoded`, with which it is shown
-    CapturedCounts captured;       // of the mesh that it was made of
-    LayerBytes shares;             // of a payload that is a run (FrameRules::is_run): its layers' bytes
-    double renewed = 0;            // TP: the share of its vertices that are new
-    double quality = 50;           // the quality setting used, under rate or error control
-    bool stands_in = false;        // motion alone, because nothing better fits the buffer
+    std::optional<FilmProjection> projection;  // that it says, where the texture is a camera's film
+    SurfaceDetail detail;                      // I, TP: of `decoded`, with which it is shown
+    CapturedCounts captured;                   // of the mesh that it was made of
+    LayerBytes shares;                         // of a payload that is a run (FrameRules::is_run): its layers' bytes
+    double renewed = 0;                        // TP: the share of its vertices that are new
+    double quality = 50;                       // the quality setting used, under rate or error control
+    bool stands_in = false;                    // motion alone, because nothing better fits the buffer
     std::size_t bytes() const;
 };
 

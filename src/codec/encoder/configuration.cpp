@@ -13,6 +13,8 @@ namespace {
 
 bool tells_presence(const EncoderOptions& options, const Mesh& first) {
     if (options.tracked.presence != SurfacePresence::automatic) return options.tracked.presence == SurfacePresence::on;
+    // What one camera sees comes and goes.
+    if (options.texture.layout == TextureLayout::projection) return true;
     return options.key_interval > 1 && comes_and_goes(first.positions, first.triangles);
 }
 
@@ -106,6 +108,7 @@ Result<PoseTracker> configure(Configuration& configuration, const Mesh& mesh, co
     header.weight_width = on_lattice(options.topology.weight_width * units);
     if (options.profile == Profile::tracked) {
         if (comes_and_goes) header.version = presence_version;
+        if (options.texture.layout == TextureLayout::projection) header.version = projected_version;
         const double spacing = options.tracked.node_spacing > 0 ? options.tracked.node_spacing
                                                                 : tracking_numbers.node_spacing.value * adult;
         header.node_spacing = std::max(on_lattice(spacing * units), 1);

@@ -23,6 +23,7 @@
 #include "codec/format/sequence.h"
 #include "core/memory_guard.h"
 #include "core/parallel.h"
+#include "surface/projection_fit.h"
 #include "surface/triangle_cleaning.h"
 
 namespace htvm {
@@ -53,7 +54,8 @@ struct Encoder::State {
     bool configured = false;  // by Encoder::begin(), or a frame that waits
     bool begun = false, finished = false;
     PoseTracker poses;
-    std::optional<bool> cleans;  // captured triangles; nothing: not decided yet
+    std::optional<bool> cleans;                  // captured triangles; nothing: not decided yet
+    std::optional<ProjectionMatrix> projection;  // of the last frame pushed, where the texture is a camera's film
     std::variant<TrackedStrategy, BonesStrategy> strategy;
     QualityControl control;
     int effort = usual_effort;         // for the next frame
@@ -107,6 +109,30 @@ void clean(State& state, LatticeMesh& mesh) {
     if (*state.cleans) mesh.triangles = std::move(cleaned.triangles);
 }
 
+// How the camera saw a mesh whose texture coordinates are places in its film; nothing of one without surface.
+Result<std::optional<FilmProjection>> find_projection(State& state, const Mesh& mesh, const LatticeMesh& on_lattice) {
+    if (on_lattice.triangles.empty()) return std::nullopt;
+    if (mesh.texcoords.empty())
+        return fail(ErrorKind::bad_input,
+                    "the mesh has no texture coordinates, from which texture.layout projection finds how the camera "
+                    "saw it");
+    const auto& texture = state.configuration.options.texture;
+    std::vector<Eigen::Vector3d> positions;
+    positions.reserve(on_lattice.positions.size());
+    for (const auto& p : on_lattice.positions) positions.emplace_back(p.x, p.y, p.z);
+    const FilmPairs pairs{positions, mesh.texcoords, 1.0 * texture.width, 1.0 * texture.height};
+    const auto found = state.projection ? follow_projection(*state.projection, pairs) : fit_projection(pairs);
+    if (!found)
+        return fail(ErrorKind::bad_input,
+                    "the mesh's texture coordinates are not one camera's projection, as they are to be with "
+                    "texture.layout projection");
+    state.projection = found;
+    FilmProjection out;
+    for (int i = 0; i < 12; ++i) out.rows[static_cast<std::size_t>(i)] = static_cast<float>((*found)(i / 4, i % 4));
+    if (!is_finite(out)) return fail(ErrorKind::bad_input, "the camera's projection of the mesh is out of range");
+    return std::optional(out);
+}
+
 Result<CapturedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* pose) {
     StageClock clock(state.stages);
     auto on_lattice = to_lattice(mesh, state.configuration.header.lattice);
@@ -123,6 +149,14 @@ Result<CapturedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose*
                         "the mesh has texture coordinates, but with texture.layout charts the stream has its own: "
                         "push it without them and without their seams");
         out.colours = std::exchange(on_lattice->colours, {});
+    }
+    if (state.configuration.options.texture.layout == TextureLayout::projection) {
+        auto projection = find_projection(state, mesh, *on_lattice);
+        if (!projection) return tl::unexpected(projection.error());
+        out.projection = *projection;
+        on_lattice->texcoords.clear();
+        out.colours = std::exchange(on_lattice->colours, {});
+        clock.done("projection");
     }
     out.mesh = std::move(*on_lattice);
     out.pose = std::move(*coded_pose);
@@ -492,9 +526,9 @@ Mesh Encoder::reconstruction() const {
     return state_->queued.decoded.empty() ? Mesh() : reconstruction(state_->queued.decoded.size() - 1);
 }
 Mesh Encoder::reconstruction(std::size_t coded) const {
-    const bool charts = state_->configuration.options.texture.layout == TextureLayout::charts;
+    const bool captured = state_->configuration.options.texture.layout == TextureLayout::captured;
     return to_mesh(state_->queued.decoded[coded].mesh, state_->configuration.header.lattice,
-                   charts ? chart_texcoord_unit : captured_texcoord_unit);
+                   captured ? captured_texcoord_unit : chart_texcoord_unit);
 }
 std::span<const std::uint32_t> Encoder::repeated_vertices() const {
     return state_->queued.decoded.empty() ? std::span<const std::uint32_t>()

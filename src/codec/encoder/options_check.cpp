@@ -63,7 +63,8 @@ Result<void> check_scene(const EncoderOptions& o) {
 
 Result<void> check_texture(const EncoderOptions& o) {
     const auto& texture = o.texture;
-    if (texture.layout > TextureLayout::charts) return bad("texture.layout must be none, captured or charts");
+    if (texture.layout > TextureLayout::projection)
+        return bad("texture.layout must be none, captured, charts or projection");
     if (texture.layout == TextureLayout::none) {
         if (texture.width != 0 || texture.height != 0)
             return bad("a size of pictures does nothing without texture.layout");
@@ -72,6 +73,11 @@ Result<void> check_texture(const EncoderOptions& o) {
     const int least = std::min(texture.width, texture.height), most = std::max(texture.width, texture.height);
     if (least < 1 || most > static_cast<int>(most_picture_side))
         return bad("texture.width and texture.height must be within 1 and " + std::to_string(most_picture_side));
+    if (texture.layout == TextureLayout::projection) {
+        if (o.profile != Profile::tracked) return bad("texture.layout projection goes with the tracked profile only");
+        if (o.tracked.presence == SurfacePresence::off)
+            return bad("with texture.layout projection frames say what is there: tracked.presence must not be off");
+    }
     if (texture.layout == TextureLayout::charts) {
         if (o.profile != Profile::tracked) return bad("texture.layout charts goes with the tracked profile only");
         if (least < 64) return bad("with texture.layout charts pictures must be at least 64 pixels wide and high");

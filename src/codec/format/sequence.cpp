@@ -104,10 +104,11 @@ Result<void> read_global_shift(ByteReader& in, GlobalShift& out) {
     return {};
 }
 
-Result<StreamTexture> read_texture(ByteReader& in) {
+Result<StreamTexture> read_texture(ByteReader& in, std::uint16_t version) {
     const auto layout = in.varint(), width = in.varint(), height = in.varint();
     if (!in.ok()) return fail(ErrorKind::corrupt_stream, "sequence header: it ends too early");
-    if (layout > static_cast<std::uint64_t>(TextureLayout::charts))
+    const auto newest = version >= projected_version ? TextureLayout::projection : TextureLayout::charts;
+    if (layout > static_cast<std::uint64_t>(newest))
         return fail(ErrorKind::unsupported,
                     "sequence header: this decoder does not know texture layout " + std::to_string(layout));
     const bool textured = layout != static_cast<std::uint64_t>(TextureLayout::none);
@@ -246,7 +247,7 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
         has = *read;
     }
     if (version >= textured_version) {
-        const auto texture = read_texture(in);
+        const auto texture = read_texture(in, version);
         if (!texture) return tl::unexpected(texture.error());
         out.texture = *texture;
     }

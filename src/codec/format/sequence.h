@@ -19,8 +19,9 @@ namespace htvm::internal {
 
 // Raised with every change of the syntax, or of a constant that both sides use. Versions from oldest_version to
 // newest_version are read, stream_version is written, grouped_version where T-frames come in groups, textured_version
-// where there is a texture, and presence_version where surface comes and goes.
-inline constexpr std::uint16_t stream_version = 4, newest_version = 7;
+// where there is a texture, presence_version where surface comes and goes, and projected_version where the texture is a
+// camera's film.
+inline constexpr std::uint16_t stream_version = 4, newest_version = 8;
 inline constexpr std::uint16_t oldest_version = 1;
 
 // From this version on a sequence header has a session. The headers of all versions since have the same syntax.
@@ -37,6 +38,9 @@ inline constexpr std::uint16_t grouped_version = 5;
 inline constexpr std::uint16_t textured_version = 6;
 // From this version on a frame says which of its reference's vertices are there (tracked/presence.h).
 inline constexpr std::uint16_t presence_version = 7;
+// From this version on a texture may be a camera's film, and a frame says how that camera saw its surface
+// (reference/film_projection.h).
+inline constexpr std::uint16_t projected_version = 8;
 
 // The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (bones/mtfan.h). The
 // paper's are 8, 16 and 32.

@@ -8,6 +8,7 @@
 
 #include "codec/format/frame_payload.h"
 #include "codec/reference/deformation_nodes.h"
+#include "codec/reference/film_projection.h"
 #include "codec/reference/vertex_hierarchy.h"
 #include "core/geometry.h"
 #include "core/lattice.h"
@@ -39,6 +40,7 @@ struct NodeReference {
     bool has_presence = false;
     Presence presence;
     VerticesAround around;
+    std::optional<FilmProjection> projection;  // likewise: how the camera saw it, where that is told
 };
 // What is derived first, for a frame that does a part of the next one's work.
 struct NodesAhead {

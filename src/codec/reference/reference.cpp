@@ -37,6 +37,7 @@ Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Th
     reference.by_nodes = std::move(*nodes);
     auto& by_nodes = *reference.by_nodes;
     by_nodes.captured = reference.captured;
+    by_nodes.projection = reference.projection;
     if (header.version >= presence_version) {
         by_nodes.has_presence = true;
         by_nodes.presence = reference.presence;
@@ -53,6 +54,7 @@ Result<Reference> make_reference(const SequenceHeader& header, ReferenceFacts fa
     out.captured = facts.captured;
     out.kept = std::move(facts.kept);
     out.textured = std::move(facts.textured);
+    out.projection = facts.projection;
     out.presence = std::move(facts.presence);
     out.detail = std::move(facts.detail);
     out.skinned.mesh = std::move(mesh);

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "codec/format/sequence.h"
+#include "codec/reference/film_projection.h"
 #include "codec/reference/node_reference.h"
 #include "codec/reference/skinning.h"
 #include "codec/reference/surface_detail.h"
@@ -17,12 +18,13 @@
 namespace htvm::internal {
 
 struct Reference {
-    std::uint32_t number = 0;  // of the frame
-    std::int32_t step = 1;     // of its positions, in lattice units; 1 if they were smoothed
-    CapturedCounts captured;   // what its frame was captured with
-    TexturedSurface textured;  // where the stream has charts: of the mesh
-    ReferenceMesh skinned;     // the mesh and its pose; what depends on bones is filled in only if it was derived
-    bool has_bones = false;    // whether it was derived
+    std::uint32_t number = 0;                  // of the frame
+    std::int32_t step = 1;                     // of its positions, in lattice units; 1 if they were smoothed
+    CapturedCounts captured;                   // what its frame was captured with
+    TexturedSurface textured;                  // where the stream has charts: of the mesh
+    std::optional<FilmProjection> projection;  // where its texture is a film: of this frame
+    ReferenceMesh skinned;   // the mesh and its pose; what depends on bones is filled in only if it was derived
+    bool has_bones = false;  // whether it was derived
     std::optional<NodeReference> by_nodes;  // what depends on the nodes, if it was derived
     KeptNodes kept;                         // of a patched mesh: what it takes over of the nodes before
     std::optional<NodesAhead> ahead;        // of what depends on the nodes, if only this was derived so far
@@ -46,6 +48,7 @@ struct ReferenceFacts {
     TexturedSurface textured = {};
     Presence presence = {};
     SurfaceDetail detail = {};
+    std::optional<FilmProjection> projection = {};
 };
 
 // Smooths an I-frame's mesh within its quantiser cells, as it is shown in streams with nodes from

@@ -177,6 +177,7 @@ TrackedState state_between(const NodeReference& reference, const FramesAround& a
         out.presence = presence_between(earlier ? earlier->presence : reference.presence, later.presence);
     out.head.captured = {count(captured.vertices, later.head.captured.vertices),
                          count(captured.triangles, later.head.captured.triangles)};
+    if (reference.projection) out.head.projection = earlier ? earlier->head.projection : *reference.projection;
     out.head.motion = around.above->motion;
     out.head.displacement = coarser(around.above->displacement);
     out.head.colour = coarser(around.above->colour);

@@ -178,7 +178,8 @@ Result<void> decode_tracked_frame(std::span<const std::uint8_t> payload, const N
                                   const TrackedState* before, Threads threads, DecodedTrackedFrame& out) {
     RangeDecoder run(payload);
     auto head =
-        read_tracked_head(run, {before ? &before->head : nullptr, reference.captured, !reference.mesh.colours.empty()});
+        read_tracked_head(run, {before ? &before->head : nullptr, reference.captured, !reference.mesh.colours.empty(),
+                                reference.projection ? &*reference.projection : nullptr});
     if (!head) return tl::unexpected(head.error());
     if (!run.end_at(payload.size() - std::min<std::size_t>(head->colour_run, payload.size())))
         return fail(ErrorKind::corrupt_stream, "tracked frame: the colours' run is longer than the payload");

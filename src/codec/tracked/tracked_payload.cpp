@@ -68,12 +68,23 @@ FieldSteps code_steps(Coder& coder, const FieldSteps& wanted, const FieldSteps* 
 }
 
 template <class Coder>
+FilmProjection code_projection(Coder& coder, const FilmProjection& wanted, const FilmProjection& before) {
+    if (code_flag(coder, wanted == before)) return before;
+    FilmProjection out;
+    for (std::size_t i = 0; i < out.rows.size(); ++i)
+        out.rows[i] = std::bit_cast<float>(coder.raw(std::bit_cast<std::uint32_t>(wanted.rows[i]), 32));
+    return out;
+}
+
+template <class Coder>
 TrackedHead code_head(Coder& coder, const TrackedHead& wanted, const KnownOfHead& known) {
     const auto* before = known.before;
     TrackedHead out;
     out.captured = code_captured(coder, wanted.captured, before ? before->captured : known.of_intra);
     out.motion = code_steps(coder, wanted.motion, before ? &before->motion : nullptr);
     out.displacement = code_steps(coder, wanted.displacement, before ? &before->displacement : nullptr, 1);
+    if (known.projection)
+        out.projection = code_projection(coder, wanted.projection, before ? before->projection : *known.projection);
     if (!known.colours) return out;
     out.colour = code_steps(coder, wanted.colour, before ? &before->colour : nullptr, 3);
     if (code_flag(coder, wanted.colour_run > 0)) out.colour_run = code_number(coder, wanted.colour_run);
@@ -97,6 +108,8 @@ Result<TrackedHead> read_tracked_head(RangeDecoder& decoder, const KnownOfHead& 
     if (out.motion.rotation_exponent > NodeMotionSteps::most_rotation ||
         out.motion.shift_exponent > NodeMotionSteps::most_shift || !in_range(out.displacement) || !in_range(out.colour))
         return fail(ErrorKind::corrupt_stream, "tracked frame: its steps are out of range");
+    if (!is_finite(out.projection))
+        return fail(ErrorKind::corrupt_stream, "tracked frame: a number of its projection is not finite");
     return out;
 }
 

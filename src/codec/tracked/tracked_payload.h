@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "codec/format/frame_payload.h"
+#include "codec/reference/film_projection.h"
 #include "codec/tracked/node_motion.h"
 #include "codec/tracked/vertex_field.h"
 #include "entropy/range_coder.h"
@@ -22,6 +23,7 @@ struct TrackedHead {
     CapturedCounts captured;  // informative
     NodeMotionSteps motion;
     FieldSteps displacement;
+    FilmProjection projection;     // of the frame; none where the reference has none
     FieldSteps colour;             // none where the reference has no colours
     std::uint32_t colour_run = 0;  // bytes of the colours' own run, the last of the payload; 0: they are in the first
     bool operator==(const TrackedHead&) const = default;
@@ -29,14 +31,15 @@ struct TrackedHead {
 
 // What both sides know before a head is coded.
 struct KnownOfHead {
-    const TrackedHead* before = nullptr;  // of the frame that this one refers to; null if that is the I-frame
-    CapturedCounts of_intra;              // what the I-frame was captured with
-    bool colours = false;                 // whether the reference has them
+    const TrackedHead* before = nullptr;         // of the frame that this one refers to; null if that is the I-frame
+    CapturedCounts of_intra;                     // what the I-frame was captured with
+    bool colours = false;                        // whether the reference has them
+    const FilmProjection* projection = nullptr;  // of the reference; null: it has none
 };
 
 // The steps must be in range, and the colours turned as in the frame before.
 void write_tracked_head(RangeEncoder& encoder, const TrackedHead& head, const KnownOfHead& known);
-// corrupt_stream if a step is out of range.
+// corrupt_stream if a step is out of range, or a number of the projection not finite.
 Result<TrackedHead> read_tracked_head(RangeDecoder& decoder, const KnownOfHead& known);
 
 // Where in the first run its parts end: position() behind each; the colours' if they are in it.

@@ -34,6 +34,7 @@ public:
         auto options = tracked_frame_options(configuration_, held.steps);
         options.noise = &held.noise;
         options.presence = held.presence;
+        options.projection = held.projection;
         options.detail = detail_;
         std::optional<TrackedState> between;
         if (frame.later > 0) {
@@ -95,6 +96,7 @@ Result<CodedGroup> code_group(const Configuration& configuration, const TrackedR
                           : before  ? before->frame
                                     : reference.decoded.number;
         frame.captured = counts_of(held[place - 1].mesh);
+        frame.projection = held[place - 1].projection;
     }
     CodedGroup out;
     for (std::size_t i = 0; i < length; ++i) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,9 +18,10 @@ struct HeldFrame {
     LatticeMesh mesh;  // as captured
     std::shared_ptr<const SurfaceIndex> surface;
     NodeRegistration registered;
-    FrameSteps steps;    // asked for
-    RemovedNoise noise;  // of the capture
-    Presence presence;   // what is there, in streams that tell it
+    FrameSteps steps;                          // asked for
+    RemovedNoise noise;                        // of the capture
+    Presence presence;                         // what is there, in streams that tell it
+    std::optional<FilmProjection> projection;  // how the camera saw it, where the texture is its film
 };
 
 // What a group may refer to, besides the reference.

@@ -105,6 +105,8 @@ Result<TrackedIntra> sent_as(const TrackedWork& work, CodedIntra coded, Presence
     frame.type = FrameType::intra;
     frame.reference = work.sequence.next_frame;
     frame.textured = std::move(charts->textured);
+    frame.projection = work.captured.projection;
+    if (frame.projection) coded.payload.set(Layer::charts, write_projection_layer(*frame.projection));
     frame.decoded = std::move(coded.decoded);
     frame.detail = std::move(coded.detail);
     frame.presence = std::move(presence);
@@ -273,6 +275,7 @@ Result<EncodedTrackedFrame> encode(const TrackedWork& work, const NodeRegistrati
     options.motion_alone = parts == MotionParts::motion_alone;
     options.target_samples = work.effort.target_samples;
     options.near = near;
+    options.projection = work.captured.projection;
     options.detail = &work.reference->decoded.detail;
     if (configuration.tells_presence()) {
         options.presence_options = presence_options(configuration);
@@ -389,6 +392,7 @@ TrackedMotion chosen_motion(const TrackedWork& work, const NodeRegistration& reg
     frame.packets.push_back(std::move(coded.packet));
     frame.decoded = std::move(coded.encoded.mesh);
     frame.presence = coded.encoded.state.presence;
+    frame.projection = work.captured.projection;
     frame.captured = counts_of(work.captured.mesh);
     frame.shares = coded.encoded.runs.shares;
     out.steps = coded.steps;
@@ -440,6 +444,7 @@ Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const No
     frame.reference = reference.decoded.number;
     frame.referred = true;
     frame.textured = std::move(*textured);
+    frame.projection = work.captured.projection;
     frame.renewed =
         vertices > 0 ? static_cast<double>(vertices - patched->stays.size()) / static_cast<double>(vertices) : 0;
     frame.decoded = std::move(patched->mesh);

@@ -370,6 +370,7 @@ void finish(const FrameSource& source, const NodeMotionSteps& steps, EncodedNode
                      static_cast<std::uint32_t>(captured.triangles.size())};
     head.motion = steps;
     head.displacement = fields.displacement.steps;
+    if (reference.projection) head.projection = options.projection.value_or(*reference.projection);
     if (fields.colours) {
         out.mesh.colours = recoloured(reference.mesh.colours, fields.colours->values);
         out.state.colour = std::move(fields.colours->history);
@@ -378,7 +379,9 @@ void finish(const FrameSource& source, const NodeMotionSteps& steps, EncodedNode
     const PresenceToWrite presence{reference.around, before ? before->presence : reference.presence,
                                    out.state.presence};
     out.runs = write_tracked_runs(
-        head, {before ? &before->head : nullptr, reference.captured, fields.colours.has_value()},
+        head,
+        {before ? &before->head : nullptr, reference.captured, fields.colours.has_value(),
+         reference.projection ? &*reference.projection : nullptr},
         {motion.decisions, fields.displacement.decisions, fields.colours ? &fields.colours->decisions : nullptr},
         reference.has_presence ? &presence : nullptr, least_run);
 }

@@ -47,6 +47,7 @@ struct TrackedFrameOptions {
     PresenceOptions presence_options;
     const PresenceHistory* presence_before = nullptr;
     std::span<const std::uint8_t> presence = {};
+    std::optional<FilmProjection> projection;  // how the camera saw the frame, where the reference has a projection
     bool motion_alone = false;  // displacement and colours stay as predicted: the smallest frame possible
     Threads threads = {};
 };

@@ -84,11 +84,12 @@ Result<std::shared_ptr<TrackedReference>> reference_of(const TrackedWork& work, 
     // Under rate control a stand-in for a frame that does not fit also refers to the I-frame. A tracked skeleton gives
     // a start for the motion of the nodes.
     const bool referred_to = !configuration.intra_only() || configuration.options.rate.bits_per_second > 0;
-    auto decoded = make_reference(
-        configuration.header,
-        {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured, frame.presence, frame.detail},
-        frame.decoded, std::move(pose),
-        {.bones = referred_to && configuration.header.has_skeleton, .nodes = referred_to}, configuration.threads);
+    auto decoded = make_reference(configuration.header,
+                                  {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured,
+                                   frame.presence, frame.detail, frame.projection},
+                                  frame.decoded, std::move(pose),
+                                  {.bones = referred_to && configuration.header.has_skeleton, .nodes = referred_to},
+                                  configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     auto out = std::make_shared<TrackedReference>();
     out->decoded = std::move(*decoded);
@@ -186,7 +187,7 @@ Result<TrackedHandout> hold(TrackedStrategy& strategy, TrackedWork& work, Tracki
     const bool place_to_start = motion.frame.access && (strategy.anchor || !held.empty());
     held.push_back({work.sequence.next_frame, work.captured.timestamp_us, std::move(work.captured.mesh),
                     work.kept_surface, std::move(*tracking.registered), motion.steps, std::move(motion.noise),
-                    motion.frame.presence});
+                    motion.frame.presence, work.captured.projection});
     const std::span<const HeldFrame> all = held;
     TrackedHandout out;
     if (place_to_start) {

@@ -69,10 +69,11 @@ export interface Frame {
     triangles: number;
     /** Size of its packet. */
     bytes: number;
-    /** Frames of one decoder with the same number have the same triangles and texture coordinates. */
+    /** Frames of one decoder with the same number have the same triangles and, but for `movingTexcoords`, texture coordinates. */
     topology: number;
     /**
-     * Frames of one decoder with the same number have the same vertices at the same places, and the same texture coordinates.
+     * Frames of one decoder with the same number have the same vertices at the same places, and, but for `movingTexcoords`,
+     * the same texture coordinates.
      * Those that show a part of that mesh have topologies of their own: their triangles are those whose three vertices are there.
      */
     referenceTopology: number;
@@ -87,6 +88,8 @@ export interface Frame {
     normals: Float32Array | null;
     /** 2 a vertex. */
     texcoords: Float32Array | null;
+    /** Whether these are a camera's projection of the positions, and so others in each frame, whatever the topology. */
+    movingTexcoords: boolean;
     /**
      * 1 a vertex: 1, or 0 where it is not there. No triangle names such a vertex, and its position is a guess at what nobody saw.
      * Null: all are there.
@@ -439,6 +442,7 @@ export class Decoder {
             colours: view.colours === 0 ? null : new Uint8Array(module.buffer, view.colours, 3 * view.vertices),
             normals: view.normals === 0 ? null : floats(view.normals, 3),
             texcoords: view.texcoords === 0 ? null : floats(view.texcoords, 2),
+            movingTexcoords: (info.attributes & constants.HTVM_MOVING_TEXCOORDS) !== 0,
             presence: view.presence === 0 ? null : new Uint8Array(module.buffer, view.presence, view.vertices),
         };
     }

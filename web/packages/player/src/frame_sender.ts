@@ -67,12 +67,13 @@ export class FrameSender {
         const newReference = frame.referenceTopology !== this.#sentReference;
         this.#sentReference = frame.referenceTopology;
         const indices = newTopology ? frame.indices.slice() : null;
-        const texcoords = newReference && frame.texcoords ? frame.texcoords.slice() : null;
+        const { movingTexcoords } = frame;
+        const texcoords = (newReference || movingTexcoords) && frame.texcoords ? frame.texcoords.slice() : null;
         const { kind, letter, frame: number, topology, referenceTopology, triangles, bytes } = frame;
         const report: FrameReport = {
             type: 'frame', ...context, kind, letter, frame: number, topology, referenceTopology, vertices, triangles, bytes,
             bounds: boundsOf(positions, frame.presence), buffer, positions, colours, normals, streamNormals: frame.normals !== null, indices,
-            texcoords, layers: decoder.layerBytes(),
+            texcoords, movingTexcoords, layers: decoder.layerBytes(),
         };
         const transfer: Transferable[] = [buffer];
         if (indices) transfer.push(indices.buffer);

@@ -134,8 +134,10 @@ export interface FrameReport {
     streamNormals: boolean;
     /** Null where the frame before of the same serial had the same topology. */
     indices: Uint32Array | null;
-    /** Null where there are none, and where the frame before of the same serial had the same reference topology. */
+    /** Null where there are none, and where the frame before of the same serial had the same ones. */
     texcoords: Float32Array | null;
+    /** Whether each frame has others, whatever its reference topology. */
+    movingTexcoords: boolean;
     /** Which of the playlist's rungs it is of; undefined where there is one quality alone. */
     rung?: number | undefined;
     /** Set by the page. Number of the texture picture to be shown with it; null: there is none; undefined: not known yet. */

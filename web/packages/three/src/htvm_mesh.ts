@@ -22,6 +22,8 @@ export interface MeshFrame {
     normals: Float32Array | Int8Array | null;
     /** 2 a vertex. Null where there are none, and where the last frame shown had the same reference topology. */
     texcoords: Float32Array | null;
+    /** Whether texture coordinates are others in each frame, whatever its topology: then they are uploaded with each. */
+    movingTexcoords?: boolean;
 }
 
 /**
@@ -68,7 +70,7 @@ export class HtvmMesh extends Mesh<BufferGeometry, Material> {
             ++this.uploads.indices;
         }
         const reference = frame.referenceTopology ?? frame.topology;
-        if (reference !== this.#reference) {
+        if (reference !== this.#reference || (frame.movingTexcoords && frame.texcoords)) {
             this.#reference = reference;
             if (frame.texcoords) this.#set('uv', frame.texcoords, 2, frame.vertices, false);
             else this.#remove('uv');
