@@ -1,7 +1,7 @@
 # 64-bit ARM under Linux, by Debian's g++-aarch64-linux-gnu; what is built runs here by qemu-user-static.
 #   cmake -S . -B build/aarch64 -DCMAKE_TOOLCHAIN_FILE=cmake/toolchains/aarch64-linux-gnu.cmake -DHTVM_BUILD_TOOLS=OFF
 # The libraries need headers alone, which serve every processor. The programs need ARM's libraries: with
-# -DCMAKE_SYSROOT=FOLDER of a Debian root for arm64, as docs/platforms.md makes one (untried).
+# -DCMAKE_SYSROOT=FOLDER of a Debian root for arm64, as tests/platforms/root.sh makes one.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
 set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)

@@ -17,6 +17,15 @@
 
 #include "core/progress.h"
 
+#ifdef _WIN32
+#ifndef NOMINMAX
+#define NOMINMAX
+#endif
+#include <windows.h>
+// Needs the names of the former.
+#include <tlhelp32.h>
+#endif
+
 namespace htvm::internal {
 namespace {
 
@@ -33,10 +42,33 @@ Pieces pieces_of(std::size_t count, Threads threads, std::size_t grain) {
     return out;
 }
 
+#ifdef _WIN32
+std::size_t threads_of_this_process() {
+    const HANDLE threads = CreateToolhelp32Snapshot(TH32CS_SNAPTHREAD, 0);  // of all processes
+    std::size_t count = 0;
+    THREADENTRY32 thread = {};
+    thread.dwSize = sizeof thread;
+    for (BOOL more = Thread32First(threads, &thread); more; more = Thread32Next(threads, &thread))
+        count += thread.th32OwnerProcessID == GetCurrentProcessId();
+    CloseHandle(threads);
+    return count;
+}
+
+// Windows' std::clock() counts the time that has passed.
+double processor_seconds() {
+    FILETIME begun, ended, kernel, user;
+    GetProcessTimes(GetCurrentProcess(), &begun, &ended, &kernel, &user);
+    auto seconds = [](const FILETIME& t) { return (t.dwHighDateTime * 4294967296.0 + t.dwLowDateTime) * 1e-7; };
+    return seconds(kernel) + seconds(user);
+}
+#else
 std::size_t threads_of_this_process() {
     return static_cast<std::size_t>(
         std::distance(std::filesystem::directory_iterator("/proc/self/task"), std::filesystem::directory_iterator()));
 }
+
+double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+#endif
 
 // Whether this process comes to `expected` threads within ten seconds: the kernel lists a thread for a moment after it
 // was joined.
@@ -48,8 +80,6 @@ bool comes_to_threads(std::size_t expected) {
     }
     return true;
 }
-
-double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 // Runners supplied by a caller.
 void in_order(std::size_t tasks, const std::function<void(std::size_t)>& task) {

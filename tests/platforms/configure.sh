@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Configures build/PLATFORM, the libraries and their tests for another processor or system:
-#   tests/platforms/configure.sh aarch64|windows [CMAKE_ARGUMENTS...]
+#   tests/platforms/configure.sh aarch64|windows [--program] [CMAKE_ARGUMENTS...]
+# --program (aarch64): build/aarch64_program, htvm as well, against a root of Debian for arm64, which HTVM_AARCH64_ROOT
+# names, or root.sh makes in build/aarch64_root.
 # Without optimisation for speed: what is asked is whether the results are the same.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -11,6 +13,14 @@ case $platform in
     windows) toolchain=x86_64-w64-mingw32 ;;
     *) echo "there is no platform '$platform'; there are: aarch64 windows" >&2; exit 2 ;;
 esac
-cmake -G Ninja -S . -B "build/$platform" -DCMAKE_TOOLCHAIN_FILE=cmake/toolchains/$toolchain.cmake \
-    -DHTVM_BUILD_TOOLS=OFF -DHTVM_BUILD_PYTHON=ON -DHTVM_DRACO=OFF -DHTVM_BUILD_BENCHMARKS=OFF -DHTVM_WERROR=ON -DHTVM_PRECOMPILED_HEADERS=all \
+build=build/$platform what=(-DHTVM_BUILD_TOOLS=OFF -DHTVM_DRACO=OFF)
+if [ "${1:-}" = --program ]; then
+    shift
+    [ "$platform" = aarch64 ] || { echo "htvm is not built for $platform: docs/platforms.md says why" >&2; exit 2; }
+    root=${HTVM_AARCH64_ROOT:-$PWD/build/aarch64_root}
+    tests/platforms/root.sh "$root"
+    build=build/${platform}_program what=(-DCMAKE_SYSROOT="$root" -DHTVM_BUILD_TOOLS=ON -DHTVM_PLAYER=OFF)
+fi
+cmake -G Ninja -S . -B "$build" -DCMAKE_TOOLCHAIN_FILE=cmake/toolchains/$toolchain.cmake "${what[@]}" \
+    -DHTVM_BUILD_PYTHON=ON -DHTVM_BUILD_BENCHMARKS=OFF -DHTVM_WERROR=ON -DHTVM_PRECOMPILED_HEADERS=all \
     -DCMAKE_CXX_FLAGS_RELEASE=-O1 "$@" >/dev/null

@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # Runs a program that was built for another processor or system:
 #   tests/platforms/emulate.sh aarch64|windows PROGRAM ARGUMENTS...
+# HTVM_EMULATED_ROOT names the root that an ARM program's libraries lie in, by default those of Debian's cross compiler.
 # Wine keeps what it calls a prefix in build/wine. Lines end as they do here.
 set -euo pipefail
 project=$(cd "$(dirname "$0")/../.." && pwd)
 platform=$1 program=$2
 shift 2
 case $platform in
-    aarch64) exec qemu-aarch64-static -L /usr/aarch64-linux-gnu "$program" "$@" ;;
+    aarch64) exec qemu-aarch64-static -L "${HTVM_EMULATED_ROOT:-/usr/aarch64-linux-gnu}" "$program" "$@" ;;
     windows)
         mkdir -p "$project/build"
         export WINEPREFIX=$project/build/wine WINEDEBUG=-all

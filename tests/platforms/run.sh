@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
 # The decoder, the encoder and the C library, built by CMake for other processors and systems and run here by qemu and
 # Wine. Prints a line for each thing that was tried; fails unless all are well.
-#   tests/platforms/run.sh [--tests[=FLOOR,...]] [PLATFORM...]   PLATFORM: aarch64, windows; default both
+#   tests/platforms/run.sh [--tests[=FLOOR,...]] [--program] [PLATFORM...]   PLATFORM: aarch64, windows; default both
 # --tests also runs the tests of the floors named, by default of all that the libraries are made of; the codec's take an
 # hour on two cores. GTEST_FILTER chooses among them.
+# --program builds htvm as well, for 64-bit ARM, and tries it beside this machine's own build/release/htvm (program.sh).
 # HTVM_ENCODED names this machine's own `encoded` (tests/digests/encoded.cpp), build/release/encoded if it does not.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
-platforms=() floors=()
+platforms=() floors=() program=
 for word in "$@"; do
     case $word in
         --tests) floors=(core entropy surface c_api synth codec) ;;
         --tests=*) IFS=, read -ra floors <<<"${word#*=}" ;;
+        --program) program=--program ;;
         *) platforms+=("$word") ;;
     esac
 done
@@ -46,9 +48,16 @@ exports() {
 }
 
 try() {
-    local platform=$1 emulate=(tests/platforms/emulate.sh "$1") build=build/$1 library floor
+    local platform=$1 emulate=(tests/platforms/emulate.sh "$1") build=build/$1 library floor options=()
     local targets=(digests encoded htvm_c_shared htvm_python example_encode example_decode "${floors[@]/#/test_}")
-    { tests/platforms/configure.sh "$platform" && cmake --build "$build" --target "${targets[@]}"; } >"$work/log" 2>&1 ||
+    if [ "$program" ] && [ "$platform" = aarch64 ]; then
+        options=(--program) build=build/${platform}_program
+        targets+=(htvm)
+        export HTVM_EMULATED_ROOT=${HTVM_AARCH64_ROOT:-$PWD/build/aarch64_root}
+    else
+        unset HTVM_EMULATED_ROOT
+    fi
+    { tests/platforms/configure.sh "$platform" "${options[@]}" && cmake --build "$build" --target "${targets[@]}"; } >"$work/log" 2>&1 ||
         { failed "$platform" "build"; return; }
     if "${emulate[@]}" "$build/digests" 4 $streams/*.htvm >"$work/log"; then
         said "$platform" "decoder: conformance frames" "$(tail -1 "$work/log")"
@@ -75,10 +84,17 @@ try() {
     else
         said "$platform" "C library: exports htvm_* alone" "$(wc -l <"$work/exported") functions"
     fi
-    if tests/platforms/wheel.sh "$platform" >"$work/log" 2>&1; then
+    if tests/platforms/wheel.sh "$platform" "$(find "$build/python" -name 'libhtvm.so' -o -name 'libhtvm.dll')" >"$work/log" 2>&1; then
         said "$platform" "Python wheel" "$(cat "$work/log")"
     else
         failed "$platform" "Python wheel"
+    fi
+    if [ ${#options[@]} -gt 0 ]; then
+        if tests/platforms/program.sh "$platform" >"$work/log" 2>&1; then
+            said "$platform" "htvm itself" "$(tail -1 "$work/log")"
+        else
+            failed "$platform" "htvm itself"
+        fi
     fi
     for floor in "${floors[@]}"; do
         if "${emulate[@]}" "$build/test_$floor" --gtest_brief=1 >"$work/log" 2>&1; then

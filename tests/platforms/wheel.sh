@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
 # The Python wheel for another processor or system, of the library in build/PLATFORM/python: its name, what it needs, and
-# what can be run of it here. wheel.sh aarch64|windows
-# 64-bit ARM: the Python package's own tests, by Debian's Python for ARM under qemu, from a root that mmdebstrap makes in
-# build/aarch64_root; where that cannot be had, a line says so. Windows: no Python can be had here, and a program does with
+# what can be run of it here. wheel.sh aarch64|windows [LIBRARY]
+# 64-bit ARM: the Python package's own tests, by Debian's Python for ARM under qemu, from the root that HTVM_AARCH64_ROOT
+# names, or root.sh makes in build/aarch64_root; where that cannot be had, a line says so. Windows: no Python can be had here, and a program does with
 # the library what the package does. Prints one line of what was seen.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 platform=$1
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-library=$(find "build/$platform/python" -name 'libhtvm.so' -o -name 'libhtvm.dll')
+library=${2:-$(find "build/$platform/python" -name 'libhtvm.so' -o -name 'libhtvm.dll')}
 wheel=$(python3 -B python/htvm_wheel.py "$library" "$work")
 python3 -m zipfile -e "$work/$wheel" "$work/installed"
 # Its own record: every file, with its digest.
@@ -28,11 +28,9 @@ PYTHON
 case $platform in
     aarch64)
         [[ $wheel == htvm-*-py3-none-manylinux_2_*_aarch64.whl ]] || { echo "the wheel's name is $wheel"; exit 1; }
-        root=build/aarch64_root
-        [ -x $root/usr/bin/python3.11 ] || nice mmdebstrap --variant=extract --architectures=arm64 \
-            --include=python3-minimal,libpython3-stdlib,python3-numpy,python3-pytest,libc6,libstdc++6 \
-            bookworm $root http://deb.debian.org/debian >"$work/log" 2>&1 || { rm -rf $root; }
-        [ -x $root/usr/bin/python3.11 ] || { echo "$wheel; not imported: no Python for ARM (mmdebstrap)"; exit 0; }
+        root=${HTVM_AARCH64_ROOT:-build/aarch64_root}
+        tests/platforms/root.sh "$root" 2>"$work/log" || true
+        [ -x "$root/usr/bin/python3.11" ] || { echo "$wheel; not imported: no Python for ARM (mmdebstrap)"; exit 0; }
         libraries=/usr/lib/aarch64-linux-gnu
         qemu-aarch64-static -L "$root" -E LD_LIBRARY_PATH=$libraries/blas:$libraries/lapack -E PYTHONPATH="$work/installed" \
             -E PYTHONDONTWRITEBYTECODE=1 "$root/usr/bin/python3.11" -m pytest -q -p no:cacheprovider python/tests >"$work/log" 2>&1 ||
