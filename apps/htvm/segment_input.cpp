@@ -145,6 +145,12 @@ Result<SegmentInput> SegmentInput::open(const std::string& place, std::uint64_t 
     if (auto read = out.read_list(file); !read) return tl::unexpected(read.error());
     if (out.list_.segments.empty() && (out.list_.has_end || !out.source_.waits))
         return fail(ErrorKind::corrupt_stream, out.shown_ + " names no segment");
+    // Nothing else of this machine's files is read because a playlist says so.
+    for (const auto& segment : out.list_.segments)
+        for (const auto& name : {segment.map_uri, segment.uri})
+            if (!out.source_.waits && !is_name_below(name))
+                return fail(ErrorKind::bad_input,
+                            fmt::format("{} names {}, which is not a file beside it", out.shown_, name));
     out.next_number_ = out.list_.first_number;
     out.began_with_end_ = out.list_.has_end;
     return out;

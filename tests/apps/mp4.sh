@@ -36,6 +36,8 @@ head -c 600 direct.mp4 >cut.mp4
 expect 3 "cut.mp4: the .mp4's" "$htvm" info cut.mp4
 # One that is cut short is decoded as far as it is whole, which is said.
 "$htvm" decode person.htvm -o of_htvm 2>/dev/null
+# The mesh of the whole stream, but for its picture, which may be cut off.
+same_mesh() { cmp -s <(grep -av '^comment TextureFile' "$1") <(grep -av '^comment TextureFile' "of_htvm/${1#*/}"); }
 for kind in "" "--fragmented --fragment 0.4"; do
     # shellcheck disable=SC2086
     "$htvm" pack person.htvm -o whole.mp4 $kind 2>/dev/null
@@ -44,7 +46,7 @@ for kind in "" "--fragmented --fragment 0.4"; do
     expect 3 "cut.mp4 is cut short: its end, " "$htvm" decode cut.mp4 -o of_mp4
     frames=$(ls of_mp4/*.ply 2>/dev/null | wc -l)
     [ "$frames" -ge 10 ] && [ "$frames" -lt 45 ] || fail "$frames frames come of an .mp4 ($kind) that is cut short"
-    for mesh in of_mp4/*.ply; do cmp -s "$mesh" "of_htvm/${mesh#*/}" || fail "$mesh of an .mp4 ($kind) that is cut short"; done
+    for mesh in of_mp4/*.ply; do same_mesh "$mesh" || fail "$mesh of an .mp4 ($kind) that is cut short"; done
 done
 rm -rf of_mp4
 printf '\0\0\0\20ftypisom\0\0\0\0\0\0\0\10moov' >empty.mp4
@@ -72,7 +74,7 @@ cmp person.htvm back.htvm || fail "encode -o .m3u8 makes another stream"
 decode_lossy() {
     rm -rf of_www
     expect 3 "$1" "$htvm" decode www/person.m3u8 -o of_www
-    for mesh in of_www/*.ply; do cmp -s "$mesh" "of_htvm/${mesh#*/}" || fail "$mesh of a playlist that $1"; done
+    for mesh in of_www/*.ply; do same_mesh "$mesh" || fail "$mesh of a playlist that $1"; done
     frames=$(ls of_www/*.ply | wc -l)
     [ "$frames" -ge "$2" ] && [ "$frames" -lt 45 ] || fail "$frames frames come of a playlist that $1"
 }
@@ -108,7 +110,7 @@ if command -v python3 >/dev/null; then
     rm -rf of_www
     expect 3 "which is not there (404); 35 frames were decoded" "$htvm" decode $at/gone/person.m3u8 -o of_www
     expect 3 "the connection ended before all of it had come" "$htvm" decode $at/cut/person.m3u8 -o of_www
-    for mesh in of_www/*.ply; do cmp -s "$mesh" "of_htvm/${mesh#*/}" || fail "$mesh of a playlist with gaps"; done
+    for mesh in of_www/*.ply; do same_mesh "$mesh" || fail "$mesh of a playlist with gaps"; done
     expect 1 "is a live stream" "$htvm" play --no-open $at/live/person.m3u8
     expect 1 "person.m3u8 is not there (404)" "$htvm" info $at/missing/person.m3u8
     expect 1 "the server answers 503: come again" "$htvm" info $at/down/person.m3u8
@@ -116,7 +118,7 @@ if command -v python3 >/dev/null; then
     expect 3 "does not begin with #EXTM3U" "$htvm" info $at/page/person.m3u8
     expect 1 "it is redirected again and again" "$htvm" info $at/round/person.m3u8
     expect 1 "is larger than the" "$htvm" info $at/endless/person.m3u8
-    expect 1 "no valid host" "$htvm" info "http://a:b@c/person.m3u8"
+    expect 1 "has a name or password" "$htvm" info "http://a:b@c/person.m3u8"
     expect 1 "cannot be fetched" "$htvm" info http://127.0.0.1:1/person.m3u8
     kill $server
     trap 'rm -rf "$work"' EXIT

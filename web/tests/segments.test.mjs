@@ -202,18 +202,6 @@ test('behind a segment that is cut short the next one begins with what its map h
     assert.equal(await page.evaluate(() => window.test.player.statistics.ladder.lostSegments), 1);
 });
 
-test('the past of a live window can be sought', options, async () => {
-    const folder = join(work, 'window');
-    const whole = await readFile(join(folder, 'dancer.m3u8'), 'utf8');
-    await writeFile(join(folder, 'past.m3u8'), whole.replace('#EXT-X-ENDLIST', '').replace('#EXT-X-PLAYLIST-TYPE:VOD', '').replace(/#EXT-X-TARGETDURATION:\d+/, '#EXT-X-TARGETDURATION:0.3'));
-    const bare = await play('/as-is/dancer.htvm');
-    await page.evaluate(() => window.test.open({ src: '/segments/window/past.m3u8' }));
-    const joined = await page.evaluate(() => window.test.frames[0].line);
-    assert.ok(bare.indexOf(joined) > 30, `joined at frame ${bare.indexOf(joined)}`);
-    assert.equal((await seek(0.5)).at(-1).line, bare[15]);
-    assert.equal((await seek(0)).at(-1).line, bare[0]);
-});
-
 test('a seek in an .mp4 asks for the bytes there alone', options, async () => {
     // What is behind the first megabyte is not read, but for where is sought.
     const bytes = await readFile(join(work, 'dancer.mp4'));
