@@ -557,8 +557,9 @@ Result<void> decode(const Options& options) {
 void add_places(CLI::App& command, Options& options) {
     command
         .add_option("input", options.input,
-                    "The stream: a file, - for standard input, or a live one, ws://HOST:PORT/watch/NAME, until it or\n"
-                    "Ctrl-C ends it")
+                    "The stream: a file (.htvm, .mp4 or .m3u8), - for standard input, a playlist,\n"
+                    "http://HOST/hls/NAME/stream.m3u8, or a live stream, ws://HOST:PORT/watch/NAME, until it or Ctrl-C "
+                    "ends it")
         ->type_name("FILE")
         ->required();
     command

@@ -16,9 +16,11 @@ namespace {
 
 void add_output(CLI::App& command, EncodeRequest& request) {
     command
-        .add_option("-o,--output", request.output,
-                    "The stream: a file, - for standard output, or a hub, for others to watch it while it is encoded:\n"
-                    "ws://HOST:PORT/publish/NAME, or wss:// with TLS")
+        .add_option(
+            "-o,--output", request.output,
+            "The stream: a file (.htvm, .mp4, or .m3u8 for segments and their playlist), - for standard output,\n"
+            "or a hub, for others to watch it while it is encoded:\n"
+            "ws://HOST:PORT/publish/NAME, or wss:// with TLS")
         ->type_name("FILE")
         ->required()
         ->group(heading::output);

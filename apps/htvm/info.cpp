@@ -572,9 +572,11 @@ void add_info(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("info", "Show what is in an .htvm stream: frames, sizes by layer, skeleton");
     command
-        ->add_option("input", options->input,
-                     "The stream: a file, - for standard input, or a live one, ws://HOST:PORT/watch/NAME, until it or\n"
-                     "Ctrl-C ends it")
+        ->add_option(
+            "input", options->input,
+            "The stream: a file (.htvm, .mp4 or .m3u8), - for standard input, a playlist,\n"
+            "http://HOST/hls/NAME/stream.m3u8, or a live stream, ws://HOST:PORT/watch/NAME, until it or Ctrl-C "
+            "ends it")
         ->type_name("FILE")
         ->required();
     command->add_flag("--summary", options->summary, "The totals only, no line per frame");

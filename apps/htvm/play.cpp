@@ -83,6 +83,9 @@ Result<fs::path> unpack(const std::string& packed, TemporaryFolder& folder) {
     const auto stream = folder.path / fs::path(packed).filename().replace_extension(".htvm");
     auto input = StreamInput::open(packed, DecoderOptions().max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
+    if (input->is_live())
+        return fail(ErrorKind::bad_input,
+                    packed + " is a live stream: its hub has a page that shows it, and 'htvm pack' keeps it in a file");
     auto output = StreamOutput::open(stream.string());
     if (!output) return tl::unexpected(output.error());
     while (const auto packet = input->next()) {

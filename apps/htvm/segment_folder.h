@@ -1,4 +1,4 @@
-// A stream as a folder of segments and a playlist (HLS), which any web server and cache can hand out; and back.
+// A stream as a folder of segments and a playlist (HLS), which any web server and cache can hand out.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "container/fragment.h"
-#include "container/mp4_tables.h"
 #include "container/playlist.h"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
@@ -50,9 +49,5 @@ private:
     std::uint64_t bytes_ = 0;
     std::size_t written_ = 0;
 };
-
-// All that a playlist names, as one .mp4 in fragments. bad_input if a file is not there, or not beside the playlist;
-// corrupt_stream if one is cut short.
-Result<FileBytes> source_of_playlist(const std::string& path);
 
 }  // namespace htvm::app

@@ -24,6 +24,7 @@
 #include "io/mesh_file.h"
 #include "live/client/hub_address.h"
 #include "segment_folder.h"
+#include "segment_input.h"
 
 namespace htvm::app {
 
@@ -83,11 +84,18 @@ Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max
         static_cast<std::size_t>(std::min<std::uint64_t>(max_packet_bytes, std::numeric_limits<std::size_t>::max()));
     input.reader_ = PacketReader(most);
     input.max_packet_bytes_ = max_packet_bytes;
+    if (live::looks_like_web_address(path) || (is_playlist_name(path) && !live::looks_like_hub_address(path))) {
+        auto segments = SegmentInput::open(path, max_packet_bytes, trust);
+        if (!segments) return tl::unexpected(segments.error());
+        input.segments_ = std::make_shared<SegmentInput>(std::move(*segments));
+        return input;
+    }
     if (live::looks_like_hub_address(path)) {
         if (path.find("/watch/") == std::string::npos)
             return fail(ErrorKind::bad_input, "'" + path.substr(0, path.find('?')) +
                                                   "' is not where a stream is "
-                                                  "watched: that is ws://HOST:PORT/watch/NAME");
+                                                  "watched: that is ws://HOST:PORT/watch/NAME, or a playlist, "
+                                                  "http://HOST/PATH.m3u8");
         auto watcher = open_watcher(path, most, trust);
         if (!watcher) return tl::unexpected(watcher.error());
         input.watcher_.emplace(std::move(*watcher));
@@ -102,10 +110,6 @@ Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max
         input.mp4_ = std::make_shared<Mp4Packets>(std::move(*opened));
         return {};
     };
-    if (is_playlist_name(path)) {
-        if (auto opened = open_mp4(source_of_playlist(path)); !opened) return tl::unexpected(opened.error());
-        return input;
-    }
     if (std::filesystem::is_directory(path))
         return fail(ErrorKind::bad_input, path + " is a folder; give an .htvm file");
     input.file_->open(path, std::ios::binary);
@@ -123,8 +127,16 @@ Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max
 
 std::uint64_t StreamInput::damaged_bytes() const {
     return reader_.damaged_bytes() + (watcher_ ? watcher_->state().damaged_bytes : 0) +
-           (mp4_ ? mp4_->damaged_bytes() : 0);
+           (mp4_ ? mp4_->damaged_bytes() : 0) + (segments_ ? segments_->damaged_bytes() : 0);
 }
+
+bool StreamInput::is_live() const { return watcher_ || (segments_ && segments_->is_live()); }
+
+std::uint64_t StreamInput::missing_bytes() const { return mp4_ ? mp4_->missing_bytes() : 0; }
+
+std::uint64_t StreamInput::lost_segments() const { return segments_ ? segments_->lost_segments() : 0; }
+
+std::string StreamInput::first_loss() const { return segments_ ? segments_->first_loss() : std::string(); }
 
 void StreamInput::go_on_with(std::vector<Packet> first, std::uint64_t offset) {
     first_.assign(std::make_move_iterator(first.begin()), std::make_move_iterator(first.end()));
@@ -161,6 +173,12 @@ bool StreamInput::begin_standard() {
 // Pushes more bytes to the reader; false at the end.
 bool StreamInput::read_some() {
     if (standard_ && !std::exchange(begun_, true) && begin_standard() && refusal_) return false;
+    if (segments_) {
+        const auto bytes = segments_->next();
+        if (bytes) reader_.push(*bytes);
+        if (!bytes) refusal_ = segments_->refusal();
+        return bytes.has_value();
+    }
     if (mp4_) {
         const auto bytes = mp4_->next();
         if (bytes) reader_.push(*bytes);
@@ -203,6 +221,15 @@ Result<void> check_whole(const StreamInput& input, const std::string& path, cons
     if (input.oversized_packets() > 0)
         return fail(ErrorKind::limit, fmt::format("{} has {} larger than --max-packet; raise --max-packet to read all",
                                                   path, counted(input.oversized_packets(), "packet")));
+    if (const auto lost = input.lost_segments(); lost > 0)
+        return fail(
+            ErrorKind::corrupt_stream,
+            fmt::format("{}{}; {}", input.first_loss(),
+                        lost > 1 ? fmt::format("; {} more are left out, too", counted(lost - 1, "segment")) : "",
+                        advice));
+    if (input.missing_bytes() > 0)
+        return fail(ErrorKind::corrupt_stream, fmt::format("{} is cut short: its end, {}, is missing; {}", path,
+                                                           counted(input.missing_bytes(), "byte"), advice));
     if (input.damaged_bytes() > 0)
         return fail(ErrorKind::corrupt_stream, fmt::format("{} is damaged: {} of it are no valid packets; {}", path,
                                                            counted(input.damaged_bytes(), "byte"), advice));
@@ -212,6 +239,11 @@ Result<void> check_whole(const StreamInput& input, const std::string& path, cons
 }
 
 Result<void> check_whole_but_for_end(const StreamInput& input, const std::string& path) {
+    if (input.missing_bytes() > 0 && input.damaged_bytes() + input.cut_short_bytes() == 0) {
+        warn(fmt::format("{} is cut short: its end, {}, is missing, and is left out", path,
+                         counted(input.missing_bytes(), "byte")));
+        return {};
+    }
     const auto torn = input.torn_bytes();
     if (torn == 0 || torn != input.damaged_bytes() + input.cut_short_bytes() || input.oversized_packets() > 0)
         return check_whole(input, path);
@@ -267,10 +299,15 @@ Result<StreamOutput> StreamOutput::open(const std::string& path, const Publishin
     if (const auto what = other_kind_of(path); !what.empty())
         return fail(ErrorKind::bad_input, path + " is the name of " + what +
                                               ", but a stream would be written there; give one that ends in .htvm");
+    const auto ending = internal::lower_case(std::filesystem::path(path).extension().string());
+    std::error_code none;
+    const bool is_device = std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none);
+    if (!is_stream_name(path) && !ending.empty() && !is_device)
+        note(fmt::format("{} becomes an .htvm stream, as {} is no ending that is known", path, ending));
     // Another file is made of these at the end.
     std::string packets = path;
     constexpr const char* packets_beside = ".htvm";
-    if (internal::lower_case(std::filesystem::path(path).extension().string()) == ".mp4") {
+    if (ending == ".mp4") {
         auto mp4 = OutputFile::create(path);
         if (!mp4) return tl::unexpected(mp4.error());
         output.mp4_.emplace(std::move(*mp4));

@@ -30,6 +30,9 @@ class App;
 namespace htvm {
 class Mp4Packets;
 }
+namespace htvm::app {
+class SegmentInput;
+}
 
 namespace htvm::app {
 
@@ -38,17 +41,23 @@ bool is_stream_name(const std::string& path);
 
 class StreamInput {
 public:
-    // "-" is standard input, ws:// and wss:// a live stream, which ends where the program is interrupted. Larger
-    // packets are skipped.
+    // "-" is standard input, ws:// and wss:// a live stream, which ends where the program is interrupted, http:// and
+    // https:// a playlist, of a live stream or a whole one. Larger packets are skipped.
     static Result<StreamInput> open(const std::string& path, std::uint64_t max_packet_bytes,
                                     const HubTrust& trust = {});
     // The next packet; nothing at the end.
     std::optional<Packet> next();
     // Why a hub does not show a live stream.
     const std::optional<Error>& refusal() const { return refusal_; }
-    bool is_live() const { return watcher_.has_value(); }
+    bool is_live() const;
     std::uint64_t damaged_bytes() const;
     std::uint64_t oversized_packets() const { return reader_.oversized_packets(); }
+    // Of a file that is cut short: bytes that it tells of and has not.
+    std::uint64_t missing_bytes() const;
+    // Of a playlist: segments that are gone or cut short, and of the first one what is wrong with it, as a sentence
+    // without its end.
+    std::uint64_t lost_segments() const;
+    std::string first_loss() const;
     // At the end: bytes of a truncated packet.
     std::size_t cut_short_bytes() const { return at_end_ ? reader_.pending_bytes() : 0; }
     // Bytes behind the last whole packet, at the end: what a program left that was killed while it wrote, or a machine
@@ -67,6 +76,7 @@ private:
     std::uint64_t max_packet_bytes_ = 0;
     std::optional<Error> refusal_;
     std::shared_ptr<Mp4Packets> mp4_;
+    std::shared_ptr<SegmentInput> segments_;
     bool standard_ = false, at_end_ = false, begun_ = false;
     PacketReader reader_;
     std::uint64_t damaged_before_ = 0;  // when the last packet was read

@@ -68,4 +68,11 @@ std::optional<MediaBox> find_box(std::span<const std::uint8_t> boxes, std::uint3
     return std::nullopt;
 }
 
+bool has_whole_boxes(std::span<const std::uint8_t> bytes) {
+    BoxReader in(bytes);
+    while (in.next())
+        ;
+    return in.ok() && !bytes.empty() && in.remaining() == 0;
+}
+
 }  // namespace htvm

@@ -76,6 +76,9 @@ private:
     bool ok_ = true;
 };
 
+// Whether the bytes are boxes one after another up to their end: of a file that is cut short they are not.
+bool has_whole_boxes(std::span<const std::uint8_t> bytes);
+
 // The first box of this type among those that begin here; nothing if there is none.
 std::optional<MediaBox> find_box(std::span<const std::uint8_t> boxes, std::uint32_t type);
 

@@ -12,12 +12,13 @@ namespace htvm {
 using namespace internal;
 
 Result<Mp4Packets> Mp4Packets::open(FileBytes file, std::uint64_t max_packet_bytes, bool goes_on) {
-    auto tracks = read_mp4_tables(file);
-    if (!tracks) return tl::unexpected(tracks.error());
+    auto tables = read_mp4_tables(file);
+    if (!tables) return tl::unexpected(tables.error());
     Mp4Packets out;
     out.file_ = std::move(file);
     out.max_packet_bytes_ = max_packet_bytes;
-    out.tracks_ = std::move(*tracks);
+    out.tracks_ = std::move(tables->tracks);
+    out.missing_ = tables->missing_bytes;
     out.goes_on_ = goes_on;
     bool has_meshes = false;
     for (std::size_t i = 0; i < out.tracks_.size(); ++i) {

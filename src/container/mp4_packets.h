@@ -19,6 +19,8 @@ public:
     std::optional<std::vector<std::uint8_t>> next();
     // Bytes that could not be read, and packets whose other part, in a track that is there, was not found.
     std::uint64_t damaged_bytes() const { return damaged_; }
+    // Bytes behind the end of a file that is cut short.
+    std::uint64_t missing_bytes() const { return missing_; }
 
 private:
     struct Other {
@@ -37,7 +39,7 @@ private:
     std::vector<std::uint8_t> configuration(const Mp4Sample& first, bool has_header) const;
 
     FileBytes file_;
-    std::uint64_t max_packet_bytes_ = 0, damaged_ = 0;
+    std::uint64_t max_packet_bytes_ = 0, damaged_ = 0, missing_ = 0;
     std::uint64_t in_vain_ = 0;  // bytes read for packets that they are not of
     std::vector<Mp4Track> tracks_;
     std::size_t meshes_ = 0;  // which of the tracks

@@ -34,13 +34,16 @@ struct Tables {
     std::size_t samples = 0;  // of all tracks
     std::uint64_t bytes = 0;  // likewise; samples that do not lie over each other are no more than the file
     bool has_movie = false;
+    std::uint64_t told_bytes = 0;  // of the file by its boxes: more than there are where it is cut short
 };
 
-// Adds a sample, if the file has it.
+// Adds a sample, if the file has it. Behind the first one of a track that was cut off nothing is added to it.
 Result<void> add(Tables& tables, OpenTrack& track, Mp4Sample sample) {
     if (tables.samples >= most_mp4_samples) return fail(ErrorKind::limit, "the .mp4 has more samples than are taken");
-    if (sample.offset > tables.file.size || sample.size > tables.file.size - sample.offset)
+    if (sample.offset > tables.told_bytes || sample.size > tables.told_bytes - sample.offset)
         return corrupt("samples lie behind its end");
+    if (sample.offset + sample.size > tables.file.size) track.track.is_cut = true;
+    if (track.track.is_cut) return {};
     tables.bytes += sample.size;
     if (tables.bytes > tables.file.size) return corrupt("samples lie over each other");
     ++tables.samples;
@@ -91,14 +94,14 @@ struct Sizes {
     std::uint32_t next() { return each > 0 ? each : in.u32(); }
 };
 
-Result<Sizes> sizes_of(std::span<const std::uint8_t> boxes, std::uint64_t file_bytes) {
+Result<Sizes> sizes_of(std::span<const std::uint8_t> boxes, std::uint64_t told_bytes) {
     const auto box = find_box(boxes, four("stsz"));
     Sizes out{BoxReader(box ? box->inside : std::span<const std::uint8_t>())};
     if (!box) return out;
     out.in.skip(4);
     out.each = out.in.u32();
     out.count = out.in.u32();
-    const bool fits = out.each > 0 ? out.count <= file_bytes / out.each : out.count <= out.in.remaining() / 4;
+    const bool fits = out.each > 0 ? out.count <= told_bytes / out.each : out.count <= out.in.remaining() / 4;
     if (!out.in.ok() || !fits) return corrupt("table of sizes is cut short");
     return out;
 }
@@ -180,7 +183,7 @@ void mark_sync(Mp4Track& track, const MediaBox& box) {
 }
 
 Result<void> read_sample_table(Tables& tables, OpenTrack& track, std::span<const std::uint8_t> boxes) {
-    auto sizes = sizes_of(boxes, tables.file.size);
+    auto sizes = sizes_of(boxes, tables.told_bytes);
     if (!sizes) return tl::unexpected(sizes.error());
     if (sizes->count == 0) return {};  // all in fragments
     auto chunks = chunks_of(boxes);
@@ -191,12 +194,13 @@ Result<void> read_sample_table(Tables& tables, OpenTrack& track, std::span<const
         auto offset = chunks->next();
         if (!offset) return corrupt("chunks have fewer samples than there are");
         if (chunks->entry == 0) return corrupt("table of chunks names no sample entry");
-        for (auto n = std::min(chunks->samples, left); n > 0; --n, --left) {
+        for (auto n = std::min(chunks->samples, left); n > 0 && !track.track.is_cut; --n, --left) {
             const auto size = sizes->next();
             if (auto ok = add(tables, track, {*offset, track.next_time, size, chunks->entry - 1, true}); !ok) return ok;
             *offset += size;
             track.next_time += durations.next();
         }
+        if (track.track.is_cut) break;
     }
     if (const auto sync = find_box(boxes, four("stss"))) mark_sync(track.track, *sync);
     return {};
@@ -292,6 +296,11 @@ Result<void> read_run(Tables& tables, OpenTrack& track, Fragment& fragment, std:
         if (auto ok = add(tables, track, {fragment.next, track.next_time, size, fragment.defaults.entry - 1, sync});
             !ok)
             return ok;
+        if (track.track.is_cut) {
+            // What says no place of its own lies behind it, and is cut off, too.
+            fragment.next = tables.file.size;
+            return {};
+        }
         fragment.next += size;
         track.next_time += duration;
     }
@@ -343,6 +352,7 @@ Result<void> read_fragment(Tables& tables, std::uint64_t begin, std::span<const 
 struct Place {
     std::uint32_t type = 0;
     std::uint64_t inside = 0, end = 0;
+    std::uint64_t missing = 0;  // bytes of it that the end of the file cuts off
 };
 
 // The box of the file that begins there; nothing if none does. One that goes beyond the file's end ends with it.
@@ -359,11 +369,28 @@ std::optional<Place> box_at(const FileBytes& file, std::uint64_t offset) {
         size = in.u64();
         header = 16;
     }
-    if (size == 0 || size > left) size = left;
+    if (size == 0) size = left;
+    if (size > left) out.missing = size - left;
+    size = std::min(size, left);
     if (!in.ok() || size < header) return std::nullopt;
     out.inside = offset + header;
     out.end = offset + size;
     return out;
+}
+
+// What the last box of the file has behind its end.
+std::uint64_t missing_bytes(const FileBytes& file) {
+    std::uint64_t out = 0;
+    for (std::uint64_t offset = 0; offset < file.size;) {
+        const auto box = box_at(file, offset);
+        constexpr std::uint64_t header = 8;
+        if (!box && file.size - offset < header) return header - (file.size - offset);
+        if (!box) break;
+        out = box->missing;
+        offset = box->end;
+    }
+    constexpr std::uint64_t most = std::uint64_t{1} << 60;
+    return std::min(out, most);
 }
 
 }  // namespace
@@ -385,8 +412,11 @@ bool looks_like_mp4(std::span<const std::uint8_t> beginning) {
     return in.ok() && std::find(first.begin(), first.end(), type) != first.end();
 }
 
-Result<std::vector<Mp4Track>> read_mp4_tables(const FileBytes& file) {
+Result<Mp4Tables> read_mp4_tables(const FileBytes& file) {
     Tables tables{file, {}};
+    Mp4Tables out;
+    out.missing_bytes = missing_bytes(file);
+    tables.told_bytes = file.size + out.missing_bytes;
     for (std::uint64_t offset = 0; offset < file.size;) {
         const auto box = box_at(file, offset);
         if (!box) break;
@@ -404,11 +434,10 @@ Result<std::vector<Mp4Track>> read_mp4_tables(const FileBytes& file) {
         offset = box->end;
     }
     if (!tables.has_movie) return corrupt("box 'moov' is missing: the file is cut short, or a piece of one");
-    std::vector<Mp4Track> out;
     bool has_meshes = false;
     for (auto& track : tables.tracks) {
         has_meshes = has_meshes || track.track.kind == SampleTrack::meshes;
-        out.push_back(std::move(track.track));
+        out.tracks.push_back(std::move(track.track));
     }
     if (!has_meshes)
         return fail(ErrorKind::bad_input, "the .mp4 has no track of meshes, which has the sample entry 'htvm'");

@@ -1,5 +1,5 @@
 // Where the samples of an .mp4 lie: its tables and fragments, of a file that may be anything. Only the tracks that a
-// stream can have are looked at.
+// stream can have are looked at. Of a file that is cut short there is what is whole.
 #pragma once
 
 #include <cstdint>
@@ -34,6 +34,12 @@ struct Mp4Track {
     // A track of meshes has the packets in the record of the configuration, for each sample entry.
     std::vector<std::vector<std::uint8_t>> configurations;
     std::vector<Mp4Sample> samples;  // each within the file
+    bool is_cut = false;  // the end of the file takes the rest of its samples, or a part of the first of those
+};
+
+struct Mp4Tables {
+    std::vector<Mp4Track> tracks;
+    std::uint64_t missing_bytes = 0;  // that its last box has behind the end of the file: the file is cut short
 };
 
 inline constexpr std::size_t most_mp4_samples = std::size_t{1} << 24;  // of all tracks
@@ -41,9 +47,10 @@ inline constexpr std::size_t most_mp4_samples = std::size_t{1} << 24;  // of all
 // Whether a file that begins with these bytes may be an .mp4 or a piece of one; eight bytes tell.
 bool looks_like_mp4(std::span<const std::uint8_t> beginning);
 
-// The tracks of meshes, of AV1 or VP9, and of Opus. corrupt_stream if tables contradict themselves or the file, or
-// samples lie over each other; bad_input if there is no track of meshes; limit if there are more samples or larger
-// tables than a stream has. All work and memory is in proportion to the file's bytes.
-Result<std::vector<Mp4Track>> read_mp4_tables(const FileBytes& file);
+// The tracks of meshes, of AV1 or VP9, and of Opus. corrupt_stream if tables contradict themselves or the file, which
+// includes what is missing of one that is cut short, or samples lie over each other; bad_input if there is no track of
+// meshes; limit if there are more samples or larger tables than a stream has. All work and memory is in proportion to
+// the file's bytes.
+Result<Mp4Tables> read_mp4_tables(const FileBytes& file);
 
 }  // namespace htvm

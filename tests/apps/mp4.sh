@@ -32,8 +32,23 @@ expect 0 "60 frames" "$htvm" join person.mp4 part.mp4 -o joined.mp4
 
 # ---- What is no such file -------------------------------------------------------------------------------------------
 
-head -c 6000 direct.mp4 >cut.mp4
+head -c 600 direct.mp4 >cut.mp4
 expect 3 "cut.mp4: the .mp4's" "$htvm" info cut.mp4
+# One that is cut short is decoded as far as it is whole, which is said.
+"$htvm" decode person.htvm -o of_htvm 2>/dev/null
+# The mesh of the whole stream, but for its picture, which may be cut off.
+same_mesh() { cmp -s <(grep -av '^comment TextureFile' "$1") <(grep -av '^comment TextureFile' "of_htvm/${1#*/}"); }
+for kind in "" "--fragmented --fragment 0.4"; do
+    # shellcheck disable=SC2086
+    "$htvm" pack person.htvm -o whole.mp4 $kind 2>/dev/null
+    head -c $(($(stat -c %s whole.mp4) * 2 / 3)) whole.mp4 >cut.mp4
+    rm -rf of_mp4
+    expect 3 "cut.mp4 is cut short: its end, " "$htvm" decode cut.mp4 -o of_mp4
+    frames=$(ls of_mp4/*.ply 2>/dev/null | wc -l)
+    [ "$frames" -ge 10 ] && [ "$frames" -lt 45 ] || fail "$frames frames come of an .mp4 ($kind) that is cut short"
+    for mesh in of_mp4/*.ply; do same_mesh "$mesh" || fail "$mesh of an .mp4 ($kind) that is cut short"; done
+done
+rm -rf of_mp4
 printf '\0\0\0\20ftypisom\0\0\0\0\0\0\0\10moov' >empty.mp4
 expect 1 "no track of meshes" "$htvm" info empty.mp4
 
@@ -55,13 +70,59 @@ grep -q '^#EXT-X-MEDIA-SEQUENCE:[1-9]' event/person.m3u8 || fail "the window's f
 mkdir encoded
 encode vp9 -o encoded/person.m3u8 && "$htvm" pack encoded/person.m3u8 -o back.htvm 2>/dev/null
 cmp person.htvm back.htvm || fail "encode -o .m3u8 makes another stream"
+# Segments that are gone or cut short are left out, which is said; what is there is decoded as ever.
+decode_lossy() {
+    rm -rf of_www
+    expect 3 "$1" "$htvm" decode www/person.m3u8 -o of_www
+    for mesh in of_www/*.ply; do same_mesh "$mesh" || fail "$mesh of a playlist that $1"; done
+    frames=$(ls of_www/*.ply | wc -l)
+    [ "$frames" -ge "$2" ] && [ "$frames" -lt 45 ] || fail "$frames frames come of a playlist that $1"
+}
 cp "www/$segment" whole.m4s
-head -c 3000 whole.m4s >"www/$segment"
-expect 3 "names $segment, which is cut short" "$htvm" info www/person.m3u8
+head -c $(($(stat -c %s whole.m4s) / 2)) whole.m4s >"www/$segment"
+decode_lossy "names $segment, which is cut short" 31
 rm "www/$segment"
-expect 1 "names $segment, which is not there" "$htvm" info www/person.m3u8
+decode_lossy "names $segment, which is not there; 30 frames were decoded" 30
+cp whole.m4s "www/$segment"
+first=$(grep '^000000' www/person.m3u8)
+mv "www/$first" first.m4s
+decode_lossy "names $first, which is not there" 15
+cp first.m4s "www/$first"
 printf '#EXTM3U\n#EXT-X-MAP:URI="../../etc/passwd"\n#EXTINF:1,\na.m4s\n' >outside.m3u8
 expect 1 "which is not a file beside it" "$htvm" info outside.m3u8
+
+# ---- By address -----------------------------------------------------------------------------------------------------
+
+if command -v python3 >/dev/null; then
+    "$htvm" pack person.htvm -o www/person.m3u8 --segment 0.3 2>/dev/null
+    printf '#EXTM3U\n#EXT-X-STREAM-INF:BANDWIDTH=1\nnowhere.m3u8\n#EXT-X-STREAM-INF:BANDWIDTH=9\nok/person.m3u8\n' >www/ladder.m3u8
+    python3 "$project/tests/apps/segments_server.py" www >port &
+    server=$!
+    trap 'kill $server; rm -rf "$work"' EXIT
+    for _ in $(seq 100); do [ -s port ] && break; sleep 0.1; done
+    at=http://127.0.0.1:$(cat port)
+    for place in ok/person.m3u8 ok/ladder.m3u8 moved/person.m3u8 busy/person.m3u8 live/person.m3u8 "ok/person.m3u8?sign=a/b"; do
+        rm -f back.htvm
+        expect 0 "back.htvm: 45 frames" "$htvm" pack "$at/$place" -o back.htvm
+        cmp person.htvm back.htvm || fail "what comes of $place is another stream"
+    done
+    expect 0 "45 frames" "$htvm" info ${at/http/HTTP}/ok/person.m3u8
+    rm -rf of_www
+    expect 3 "which is not there (404); 35 frames were decoded" "$htvm" decode $at/gone/person.m3u8 -o of_www
+    expect 3 "the connection ended before all of it had come" "$htvm" decode $at/cut/person.m3u8 -o of_www
+    for mesh in of_www/*.ply; do same_mesh "$mesh" || fail "$mesh of a playlist with gaps"; done
+    expect 1 "is a live stream" "$htvm" play --no-open $at/live/person.m3u8
+    expect 1 "person.m3u8 is not there (404)" "$htvm" info $at/missing/person.m3u8
+    expect 1 "the server answers 503: come again" "$htvm" info $at/down/person.m3u8
+    expect 1 "a link or a token is missing" "$htvm" info $at/secret/person.m3u8
+    expect 3 "does not begin with #EXTM3U" "$htvm" info $at/page/person.m3u8
+    expect 1 "it is redirected again and again" "$htvm" info $at/round/person.m3u8
+    expect 1 "is larger than the" "$htvm" info $at/endless/person.m3u8
+    expect 1 "has a name or password" "$htvm" info "http://a:b@c/person.m3u8"
+    expect 1 "cannot be fetched" "$htvm" info http://127.0.0.1:1/person.m3u8
+    kill $server
+    trap 'rm -rf "$work"' EXIT
+fi
 
 # ---- Other tools ----------------------------------------------------------------------------------------------------
 

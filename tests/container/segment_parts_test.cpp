@@ -83,15 +83,15 @@ TEST(SegmentParts, have_pictures_of_another_size_as_whole_packets) {
     const auto mp4 = joined(parts_of(stream, 0.16, 0.07));
     const auto tables = read_mp4_tables(htvm::source_of(mp4));
     ASSERT_TRUE(tables);
-    ASSERT_EQ((*tables)[1].kind, SampleTrack::pictures);
-    EXPECT_EQ((*tables)[1].samples.size(), 8u) << "those of frames 0 to 7: the rest goes on from the other size";
+    ASSERT_EQ(tables->tracks[1].kind, SampleTrack::pictures);
+    EXPECT_EQ(tables->tracks[1].samples.size(), 8u) << "those of frames 0 to 7: the rest goes on from the other size";
     const auto back = unpacked(mp4);
     ASSERT_TRUE(back);
     EXPECT_EQ(back->damaged, 0u);
     EXPECT_EQ(back->bytes, bytes_of(stream));
     // Whole segments know all before their map is written.
     const auto whole = read_mp4_tables(htvm::source_of(joined(parts_of(stream, 0.16, 0))));
-    EXPECT_EQ((*whole)[1].samples.size(), 12u);
+    EXPECT_EQ(whole->tracks[1].samples.size(), 12u);
 }
 
 }  // namespace

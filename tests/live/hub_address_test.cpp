@@ -51,5 +51,27 @@ TEST(HubAddress, FilesDoNotLookLikeIt) {
     EXPECT_FALSE(looks_like_hub_address("folder/a:b.htvm"));
 }
 
+TEST(WebAddress, WhatAPlaylistNamesIsWhereItIsOrAnywhere) {
+    const auto base = parse_web_address("https://a.example/hls/anna/stream.m3u8?sign=b/c").value();
+    const auto resolved = [&](const char* reference) {
+        const auto out = resolved_reference(base, reference);
+        return out ? web_text(*out) : "refused";
+    };
+    EXPECT_EQ(resolved("1.m4s"), "https://a.example/hls/anna/1.m4s");
+    EXPECT_EQ(resolved("../../1.m4s?x=../y#z"), "https://a.example/1.m4s?x=../y");
+    EXPECT_EQ(resolved("../../../../1.m4s"), "https://a.example/1.m4s");
+    EXPECT_EQ(resolved("./b/."), "https://a.example/hls/anna/b/");
+    EXPECT_EQ(resolved("/1.m4s"), "https://a.example/1.m4s");
+    EXPECT_EQ(resolved("//b.example:8443/1.m4s"), "https://b.example:8443/1.m4s");
+    EXPECT_EQ(resolved("http://b.example/1.m4s"), "http://b.example/1.m4s");
+    EXPECT_EQ(resolved("?part=1"), "https://a.example/hls/anna/stream.m3u8?part=1");
+    for (const char* other :
+         {"file:///etc/passwd", "ftp://b.example/1", "javascript:1", "https://me:pw@b.example/", "a b"})
+        EXPECT_EQ(resolved(other), "refused") << other;
+    EXPECT_EQ(shown_web(base), "https://a.example/hls/anna/stream.m3u8");
+    EXPECT_TRUE(looks_like_web_address("HTTPS://a"));
+    EXPECT_FALSE(looks_like_web_address("ws://a"));
+}
+
 }  // namespace
 }  // namespace htvm::live

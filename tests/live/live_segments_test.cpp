@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <ctime>
 #include <regex>
 #include <string>
 #include <vector>
@@ -80,6 +82,39 @@ TEST_F(LiveSegmentsTest, AStreamThatEndsIsThereByteForByte) {
     EXPECT_EQ(list().segments.size(), 3u);
     EXPECT_TRUE(list().has_end);
     EXPECT_EQ(stream(), sent);
+}
+
+TEST_F(LiveSegmentsTest, AStreamShorterThanASegmentIsThereOnceItFallsSilent) {
+    begin({.seconds = 2});
+    send(live_header(1));
+    send_frames(0, 20);
+    segments->tick(now += std::chrono::milliseconds(1900));
+    EXPECT_EQ(text(), "") << "more may come";
+    segments->tick(now += std::chrono::milliseconds(200));
+    ASSERT_EQ(list().segments.size(), 1u);
+    EXPECT_FALSE(list().has_end);
+    EXPECT_EQ(stream(), sent);
+    // It goes on where decoding can start.
+    send_frames(20, 100);
+    EXPECT_EQ(list().segments.size(), 2u);
+    EXPECT_NE(text().find("#EXT-X-DISCONTINUITY\n"), std::string::npos);
+}
+
+TEST_F(LiveSegmentsTest, DatesSayWhenTheFirstFrameCame) {
+    const auto before = std::chrono::system_clock::now();
+    begin({.seconds = 1});
+    send(live_header(1));
+    send_frames(0, 75);
+    hub->leave(publisher, true, now);
+    const auto all = text();
+    int dates = 0;
+    for (std::size_t at = 0; (at = all.find("DATE-TIME:", at)) != std::string::npos; ++dates) {
+        std::tm parts{};
+        ASSERT_NE(strptime(all.c_str() + (at += 10), "%Y-%m-%dT%H:%M:%S", &parts), nullptr);
+        const auto date = std::chrono::system_clock::from_time_t(timegm(&parts));
+        EXPECT_GE(date, std::chrono::floor<std::chrono::seconds>(before)) << "frames of 2.5 s came at once";
+    }
+    EXPECT_EQ(dates, 3);
 }
 
 TEST_F(LiveSegmentsTest, WhatLeavesTheWindowCanBeFetchedAsLongAgain) {

@@ -21,7 +21,7 @@ const base = 'https://a.example/live/stream.m3u8';
 let work, server, browser, page, parts;
 
 before(async () => {
-    const contents = "export * from './playlist.ts'; export * from './mp4_tables.ts'; export * from './segment_list.ts';";
+    const contents = "export * from './playlist.ts'; export * from './mp4_tables.ts'; export * from './mp4_samples.ts'; export * from './segment_list.ts';";
     const { outputFiles } = await build({
         stdin: { contents, resolveDir: path('../packages/player/src') }, bundle: true, format: 'esm', platform: 'node', write: false, logLevel: 'error',
     });
@@ -32,7 +32,7 @@ before(async () => {
     const pack = (...words) => execFileSync(program, ['pack', join(work, 'dancer.htvm'), '-o', ...words, '--quiet']);
     pack(join(work, 'dancer.mp4'));
     pack(join(work, 'pieces.mp4'), '--fragmented', '--fragment', '1');
-    for (const name of ['whole', 'holes', 'lies', 'window']) {
+    for (const name of ['whole', 'holes', 'lies', 'cut', 'window']) {
         await mkdir(join(work, name));
         pack(join(work, name, 'dancer.m3u8'), '--segment', '0.6');
     }
@@ -184,6 +184,43 @@ test('a segment that is gone, and one that is not what it says, are left out wit
     for (const line of shown) assert.ok(bare.includes(line), line);
     assert.equal(shown.at(-1), bare.at(-1));
     assert.match((await page.evaluate(() => window.test.notices)).join('\n'), /A segment of the stream is gone, or cannot be read, and is left out/);
+    assert.equal(await page.evaluate(() => window.test.player.statistics.ladder.lostSegments), 2);
+});
+
+test('behind a segment that is cut short the next one begins with what its map has, and the panel says so', options, async () => {
+    const folder = join(work, 'cut');
+    const names = (await readdir(folder)).filter((name) => name.endsWith('.m4s')).sort((a, b) => parseInt(a) - parseInt(b));
+    const bytes = await readFile(join(folder, names[1]));
+    await writeFile(join(folder, names[1]), bytes.subarray(0, Math.floor(bytes.length / 2)));
+    const bare = await play('/as-is/dancer.htvm');
+    server.requests.length = 0;
+    const shown = await play('/segments/cut/dancer.m3u8');
+    assert.ok(shown.length > frames - 20 && shown.length < frames, `${shown.length} frames`);
+    assert.equal(shown.at(-1), bare.at(-1));
+    const whole = bare.filter((line) => !shown.includes(line)).length;
+    assert.equal(whole, frames - shown.length, 'all that is shown is right');
+    assert.equal(await page.evaluate(() => window.test.player.statistics.ladder.lostSegments), 1);
+});
+
+test('a seek in an .mp4 asks for the bytes there alone', options, async () => {
+    // What is behind the first megabyte is not read, but for where is sought.
+    const bytes = await readFile(join(work, 'dancer.mp4'));
+    const free = box('free', Buffer.alloc(8 << 20));
+    const at = bytes.indexOf('mdat') - 4;
+    // Tables in front, then 8 MiB that nobody needs, before the samples, whose places move by as much.
+    const moved = Buffer.from(bytes);
+    for (let chunk = moved.indexOf('co64'); chunk >= 0 && chunk < at; chunk = moved.indexOf('co64', chunk + 4)) {
+        const count = moved.readUInt32BE(chunk + 8);
+        for (let i = 0; i < count; ++i) moved.writeUInt32BE(moved.readUInt32BE(chunk + 16 + 8 * i) + free.length, chunk + 16 + 8 * i);
+    }
+    server.made.set('far.mp4', Buffer.concat([moved.subarray(0, at), free, moved.subarray(at)]));
+    const bare = await play('/as-is/dancer.htvm');
+    server.requests.length = 0;
+    await page.evaluate(() => window.test.open({ src: '/as-is/far.mp4' }));
+    assert.equal((await seek(2.97)).at(-1).line, bare[89]);
+    const asked = server.requests.map(({ range }) => /bytes=(\d+)-(\d+)/.exec(range ?? '')).filter((range) => range);
+    const covered = new Set(asked.flatMap(([, from, to]) => [Number(from) >> 18, Math.min(Number(to), (8 << 20) + bytes.length) >> 18]));
+    assert.ok(covered.size > 0 && ![...covered].some((block) => block > 5 && block < 31), `blocks ${[...covered]}`);
 });
 
 test('a truncated segment shows its whole frames', options, async () => {

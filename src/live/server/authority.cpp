@@ -80,14 +80,10 @@ Authority::Authority(AuthorityOptions options, HubAddress address)
 }
 
 Result<Authority> Authority::open(const AuthorityOptions& options) {
-    // Such an address differs from that of a live stream in its scheme alone.
-    const auto scheme = internal::lower_case(std::string_view(options.url).substr(0, options.url.find("://")));
-    const bool known = scheme == "http" || scheme == "https";
-    auto address = parse_hub_address("ws" + (known ? options.url.substr(4) : std::string()));
-    if (!known || !address)
+    auto address = parse_web_address(options.url);
+    if (!address)
         return fail(ErrorKind::bad_input, "'" + options.url.substr(0, options.url.find('?')) +
                                               "' is no address of who says who may: http://HOST:PORT/PATH or https");
-    address->secure = scheme == "https";
     return Authority(options, std::move(*address));
 }
 

@@ -153,8 +153,21 @@ struct Work {
     std::optional<StreamSegmenter> segmenter{};  // none: it begins with a frame that can be decoded by itself
     std::size_t held = 0;                        // bytes of it that the share counts
     bool discontinuity = false;                  // the next segment's times begin anew
-    Clock::time_point segment_begun{}, asked{};
+    Clock::time_point segment_begun{}, asked{}, heard{};
+    // Frames that no shown segment begins behind: when each is shown, from the first one on, and when it came.
+    struct Arrival {
+        std::int64_t begin_us = 0, unix_ms = 0;
+    };
+    std::deque<Arrival> arrivals{};
+    std::optional<std::int64_t> first_us{};  // of the segmenter's first frame
 };
+
+// When the frame came with which a segment begins: a segment is there later, with the end of the stream much later.
+std::int64_t came_at(Work& work, std::int64_t begin_us) {
+    auto& arrivals = work.arrivals;
+    while (arrivals.size() > 1 && arrivals[1].begin_us <= begin_us) arrivals.pop_front();
+    return arrivals.empty() ? unix_ms() : arrivals.front().unix_ms;
+}
 
 bool same_bytes(const SharedPacket& a, const SharedPacket& b) {
     // What is before the payload has the number of the frame that it comes with.
@@ -190,6 +203,7 @@ struct LiveSegments::State {
     void lose(const std::string& name, Work& work);
     void end(const std::string& name);
     void gave_way(const std::string& name);
+    void show_what_stands_still(Clock::time_point now);
     void show(const std::string& name, Work& work, StreamSegment segment);
     void begin_segment(Shown& shown, Work& work, const StreamSegment& segment);
     void close_segment(Shown& shown, const Work& work);
@@ -233,12 +247,18 @@ void LiveSegments::State::take(const std::string& name, const SharedPacket& pack
         work.segmenter.emplace(
             SegmentCuts{.seconds = (1 - early) * options.seconds, .part_seconds = options.part_seconds});
         work.segment_begun = now;
+        work.arrivals.clear();
+        work.first_us.reset();
         const auto before = std::exchange(work.before, {});
         push(name, work, work.header, now);
         for (const auto& one : before) push(name, work, one, now);
         push(name, work, packet, now);
     } else if (packet->is_frame()) {
         work.before.clear();
+        const std::chrono::duration<double> since_asked = now - work.asked;
+        if (since_asked.count() < options.seconds) return;
+        work.asked = now;
+        hub.ask_for_key_frame(name, now);
     } else if (kind == PacketKind::codebook) {
         constexpr std::size_t most = 64;
         if (work.before.size() < most) work.before.push_back(packet);
@@ -247,6 +267,13 @@ void LiveSegments::State::take(const std::string& name, const SharedPacket& pack
 
 void LiveSegments::State::push(const std::string& name, Work& work, const SharedPacket& packet, Clock::time_point now) {
     if (!work.segmenter) return;
+    work.heard = now;
+    if (packet->is_frame()) {
+        if (!work.first_us) work.first_us = packet->header.timestamp_us;
+        constexpr std::size_t most_arrivals = 65536;
+        if (work.arrivals.size() < most_arrivals)
+            work.arrivals.push_back({packet->header.timestamp_us - *work.first_us, unix_ms()});
+    }
     const auto room = [&] { return hub.make_room(*work.share, 2 * packet->bytes.size(), now); };
     if (!room()) return lose(name, work);
     auto segment = work.segmenter->push(packet_of(*packet));
@@ -331,6 +358,21 @@ void LiveSegments::State::gave_way(const std::string& name) {
     ++counts.lost;
 }
 
+// A stream that falls silent before it has a segment has what came as one, so that there is a playlist of it.
+void LiveSegments::State::show_what_stands_still(Clock::time_point now) {
+    for (auto& [name, work] : works) {
+        const std::chrono::duration<double> silence = now - work.heard;
+        if (!work.segmenter || silence.count() < options.seconds) continue;
+        {
+            const std::lock_guard lock(mutex);
+            const auto& shown = streams[name];
+            if (!shown.listed.empty() || shown.open) continue;
+        }
+        finish(name, work);
+        wake(name);
+    }
+}
+
 // ---- From segments to playlists -------------------------------------------------------------------------------------
 
 void LiveSegments::State::show(const std::string& name, Work& work, StreamSegment segment) {
@@ -365,8 +407,7 @@ void LiveSegments::State::begin_segment(Shown& shown, Work& work, const StreamSe
     const auto map = text_of(segment.map);
     next.entry.map_uri = "map-" + name_of(map) + ".mp4";
     next.entry.discontinuity = std::exchange(work.discontinuity, false);
-    // It is whole once the next frame has come.
-    next.entry.unix_ms = unix_ms() - (segment.end_us - segment.begin_us) / 1000;
+    next.entry.unix_ms = came_at(work, segment.begin_us);
     if (++shown.uses_of_map[next.entry.map_uri] == 1) {
         const auto bytes = counted(map, work.share);
         shown.files[next.entry.map_uri] = {bytes, *bytes};
@@ -532,6 +573,7 @@ Found LiveSegments::file(const std::string& stream, const std::string& name, con
 
 void LiveSegments::tick(Clock::time_point now) {
     auto& state = *state_;
+    state.show_what_stands_still(now);
     const std::lock_guard lock(state.mutex);
     std::erase_if(state.streams, [&](const auto& stream) {
         return stream.second.ended && now - *stream.second.ended > state.options.remembered;

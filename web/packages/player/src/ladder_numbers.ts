@@ -13,6 +13,8 @@ export interface LadderNumbers {
     lineMegabitsPerSecond: number | null;
     /** Fetched and not decoded yet, when the last segment had come. */
     secondsFetched: number;
+    /** Segments that were left out, all or in part, as they are gone, cut short or damaged. */
+    lostSegments: number;
     /** Whether segments are still being added. */
     live: boolean;
 }
@@ -20,14 +22,14 @@ export interface LadderNumbers {
 /** What is told of a stream in segments. */
 export function ladderNumbers({ ladder, current }: { ladder: LadderReport | null; current: FrameReport | null }): LadderNumbers | null {
     if (!ladder) return null;
-    const { rungs, rung, reason, lineMegabitsPerSecond, secondsFetched, live } = ladder;
-    return { rungs, shown: current?.rung ?? null, fetched: rung, reason, lineMegabitsPerSecond, secondsFetched, live };
+    const { rungs, rung, reason, lineMegabitsPerSecond, secondsFetched, lostSegments, live } = ladder;
+    return { rungs, shown: current?.rung ?? null, fetched: rung, reason, lineMegabitsPerSecond, secondsFetched, lostSegments, live };
 }
 
 /** For the panel. */
 export function ladderLines(ladder: LadderNumbers | null): string[] {
     if (!ladder) return [];
-    const { rungs, shown, fetched, reason, lineMegabitsPerSecond, secondsFetched } = ladder;
+    const { rungs, shown, fetched, reason, lineMegabitsPerSecond, secondsFetched, lostSegments } = ladder;
     const name = (rung: number | null): string => {
         const { megabitsPerSecond = 0, resolution = '' } = rungs[rung ?? fetched] ?? {};
         return `${(rung ?? fetched) + 1} of ${rungs.length}: ${megabitsPerSecond.toFixed(2)} Mbit/s${resolution ? `, ${resolution}` : ''}`;
@@ -36,5 +38,6 @@ export function ladderLines(ladder: LadderNumbers | null): string[] {
     return [
         ...(rungs.length > 1 ? [`rung     ${name(shown)}`, `next     ${name(fetched)}; ${reason}`] : []),
         `line     ${line}, ${secondsFetched.toFixed(1)} s fetched`,
+        ...(lostSegments > 0 ? [`lost     ${lostSegments} ${lostSegments === 1 ? 'segment' : 'segments'}`] : []),
     ];
 }

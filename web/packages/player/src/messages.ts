@@ -62,6 +62,8 @@ export interface LadderReport {
     lineMegabitsPerSecond: number | null;
     /** That were fetched and not decoded yet. */
     secondsFetched: number;
+    /** Segments that were left out, all or in part, as they are gone, cut short or damaged. */
+    lostSegments: number;
     /** Whether segments are still being added. */
     live: boolean;
 }

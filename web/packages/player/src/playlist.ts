@@ -91,10 +91,11 @@ function readSegments(lines: string[], base: string): MediaPlaylist {
     return out;
 }
 
-// NAME=VALUE or NAME="VALUE", with commas between.
+// NAME=VALUE or NAME="VALUE", with commas between. A name begins the line or is behind a comma, so that each letter is looked at
+// a few times, however long the line is.
 function attributesOf(line: string): Map<string, string> {
     const out = new Map<string, string>();
-    for (const [, name, quoted, plain] of line.slice(line.indexOf(':') + 1).matchAll(/([A-Z0-9-]+)=(?:"([^"]*)"|([^",]*))/g))
+    for (const [, name, quoted, plain] of line.slice(line.indexOf(':') + 1).matchAll(/(?:^|,)\s*([A-Z0-9-]+)=(?:"([^"]*)"|([^",]*))/g))
         out.set(name!, quoted ?? plain ?? '');
     return out;
 }

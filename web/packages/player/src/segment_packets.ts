@@ -9,7 +9,7 @@ import { SampleReader } from './mp4_samples.js';
 import { boxesOf, Fields, readFragment, readMovie, Samples, type Movie } from './mp4_tables.js';
 import type { Segment } from './playlist.js';
 import { chooseRung, shouldGiveUp, type RungChoice } from './rung_choice.js';
-import { fetchFile, type Progress } from './segment_fetch.js';
+import { fetchFile, type Fetched, type Progress } from './segment_fetch.js';
 import { SegmentLists } from './segment_list.js';
 import type { Place, StreamPackets, TimedPacket } from './stream_packets.js';
 
@@ -18,6 +18,7 @@ const keptToRise = 1.5; // seconds of a lower rung that are kept where the line 
 const muchMore = 2;
 const ratesKept = 4;
 const mapsKept = 8;
+const mostUnreachable = 3; // segments in a row that do not come, before the stream counts as unreachable
 const gapUs = 100000; // from here on time between two segments is left out
 const mendedUs = 1e6; // by which a segment's own time may differ from the list's
 
@@ -29,6 +30,8 @@ interface Loaded {
     reader: SampleReader;
     /** What its first frame needs; null where it follows the segment before. */
     needed: Packet[] | null;
+    /** It was said that parts of it are. */
+    damaged: boolean;
 }
 
 export class SegmentPackets implements StreamPackets {
@@ -48,6 +51,8 @@ export class SegmentPackets implements StreamPackets {
     #rates: number[] = [];
     #atMost = { number: -1, rung: 0 }; // of a segment that was given up in a higher rung
     #loaded: Loaded[] = [];
+    #lost = 0; // segments, all or in part
+    #unreachable = 0; // segments in a row that no connection brought
     #complete = false;
     #failure: unknown = null;
     #choice: RungChoice = { rung: 0, reason: 'it begins low' };
@@ -152,7 +157,7 @@ export class SegmentPackets implements StreamPackets {
 
     async #take(loaded: Loaded, sample: number): Promise<void> {
         const { packets, timeUs, baseUs, damagedBytes } = await loaded.reader.packetsOf(sample);
-        if (damagedBytes > 0) this.#notice('Parts of a segment are damaged, and are left out.');
+        if (damagedBytes > 0 && !loaded.damaged) this.#lose(loaded);
         const first = sample === 0;
         if (first) this.#begin(loaded, timeUs);
         const ownUs = timeUs + (this.#originUs ?? 0);
@@ -216,6 +221,7 @@ export class SegmentPackets implements StreamPackets {
         if (segment) return segment;
         if (this.#nextNumber < list.firstNumber) {
             this.#notice('What comes next is no longer there: playing goes on nearer to the end.');
+            this.#lost += list.firstNumber - this.#nextNumber;
             this.#nextNumber = this.#lists.numberAt(rung, list.ended ? 0 : null);
             this.#tracks = null;
             return list.segments.length > 0 ? 'later' : 'none';
@@ -278,7 +284,7 @@ export class SegmentPackets implements StreamPackets {
                 bitsLeft: Math.max(8 * ((total ?? expectedBytes) - bytes), 1), bitsPerSecond, rung, lowestBits,
                 aheadSeconds: this.#ahead, segmentSeconds: segment.seconds,
             });
-        const fetched = await fetchFile(segment.url, signal, giveUp);
+        const fetched = await this.#fetchSegment(segment, signal, giveUp);
         if (signal.aborted) return;
         if (fetched.outcome === 'gone') return this.#leaveOut(segment);
         if (fetched.outcome === 'given up') {
@@ -291,7 +297,13 @@ export class SegmentPackets implements StreamPackets {
                 map = await this.#map(segment, signal);
                 if (signal.aborted) return;
             }
-            this.#loaded.push(this.#read(segment, rung, map, fetched.bytes, anew));
+            const loaded = this.#read(segment, rung, map, fetched.bytes, anew);
+            this.#loaded.push(loaded);
+            // What its lost frames would have left for the next segment is in that one's map.
+            if (isCutShort(loaded.movie, fetched.bytes.length)) {
+                this.#lose(loaded);
+                this.#tracks = null;
+            }
         } catch (error) {
             if (!(error instanceof SourceError)) throw error;
             return this.#leaveOut(segment);
@@ -300,6 +312,18 @@ export class SegmentPackets implements StreamPackets {
         this.#nextNumber = segment.number + 1;
         this.#wake();
         this.#tell();
+    }
+
+    // Where a connection breaks again and again, it may be this segment's fault alone.
+    async #fetchSegment({ url }: Segment, signal: AbortSignal, giveUp: (progress: Progress) => boolean): Promise<Fetched> {
+        try {
+            const fetched = await fetchFile(url, signal, giveUp);
+            this.#unreachable = 0;
+            return fetched;
+        } catch (error) {
+            if (signal.aborted || ++this.#unreachable >= mostUnreachable) throw error;
+            return { outcome: 'gone' };
+        }
     }
 
     async #map({ mapUrl }: Segment, signal: AbortSignal): Promise<Uint8Array | null> {
@@ -323,13 +347,22 @@ export class SegmentPackets implements StreamPackets {
         for (const { type, begin, inside } of boxesOf(bytes, true)) if (type === 'moof') readFragment(movie, begin, inside);
         if (tracks.find(({ kind }) => kind === 'meshes')!.samples.count === 0) throw new SourceError('not-htvm', 'A segment has no frames.');
         const reader = new SampleReader(movie, async (offset, size) => (offset >= 0 && offset + size <= bytes.length ? bytes.subarray(offset, offset + size) : null));
-        return { segment, rung, movie, reader, needed: anew ? reader.configurationOf(0) : null };
+        return { segment, rung, movie, reader, needed: anew ? reader.configurationOf(0) : null, damaged: false };
+    }
+
+    #lose(loaded: Loaded): void {
+        loaded.damaged = true;
+        ++this.#lost;
+        this.#notice('Parts of a segment are damaged, and are left out.');
+        this.#tell();
     }
 
     #leaveOut({ number }: Segment): void {
+        ++this.#lost;
         this.#notice('A segment of the stream is gone, or cannot be read, and is left out.');
         this.#nextNumber = number + 1;
         this.#tracks = null;
+        this.#tell();
     }
 
     #measured(bitsPerSecond: number): void {
@@ -344,9 +377,13 @@ export class SegmentPackets implements StreamPackets {
         const rate = this.#rates.at(-1);
         this.#report({
             type: 'ladder', rungs, rung, reason, lineMegabitsPerSecond: rate === undefined ? null : rate / 1e6, secondsFetched: this.#ahead,
-            live: this.#lists.live,
+            lostSegments: this.#lost, live: this.#lists.live,
         });
     }
+}
+
+function isCutShort({ tracks }: Movie, bytes: number): boolean {
+    return tracks.some(({ samples }) => samples.offsets.some((offset, i) => offset + samples.sizes[i]! > bytes));
 }
 
 // Whether a segment has tracks that the map read last does not tell of.
