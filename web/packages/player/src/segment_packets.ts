@@ -19,6 +19,7 @@ const muchMore = 2;
 const ratesKept = 4;
 const mapsKept = 8;
 const mostUnreachable = 3; // segments in a row that do not come, before the stream counts as unreachable
+const freshenMs = 150; // a cache's first answer may be as old as its last viewer's: so soon the list is read again
 const gapUs = 100000; // from here on time between two segments is left out
 const mendedUs = 1e6; // by which a segment's own time may differ from the list's
 
@@ -91,7 +92,8 @@ export class SegmentPackets implements StreamPackets {
         const joins = !this.#opened && soughtUs === 0 && this.#lists.live;
         this.#opened = true;
         const rung = Math.min(this.#rung ?? 0, this.#lists.rungs.length - 1);
-        if (!this.#lists.listOf(rung) || (this.#lists.live && this.#lists.goodForMs(rung) === 0)) await this.#lists.read(rung, signal);
+        if (joins) await pause(freshenMs, signal);
+        if (!this.#lists.listOf(rung) || joins || (this.#lists.live && this.#lists.goodForMs(rung) === 0)) await this.#lists.read(rung, signal);
         this.#nextNumber = this.#lists.numberAt(rung, joins ? null : soughtUs);
         this.#tracks = null;
         this.#loaded = [];
