@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -110,27 +111,67 @@ Normalisation normalisation_of(const std::vector<Pair>& pairs) {
     return out;
 }
 
-// In pixels, of pairs as they are.
-ProjectionMatrix fitted(const std::vector<Pair>& pairs, const FilmPairs& film) {
+ProjectionMatrix from_afar() {
+    ProjectionMatrix out = ProjectionMatrix::Zero();
+    out(2, 3) = 1;
+    return out;
+}
+
+std::vector<bool> within(const std::vector<double>& errors, double most) {
+    std::vector<bool> out(errors.size());
+    for (std::size_t i = 0; i < errors.size(); ++i) out[i] = errors[i] <= most;
+    return out;
+}
+
+// At least what single precision rounds to stays in use.
+double most_in_use(const std::vector<double>& errors) { return std::max(3 * median_of(errors), 1e-7); }
+
+// Begun with the pairs in use, which change from round to round.
+ProjectionMatrix refined(const std::vector<Pair>& unit, std::vector<bool> is_used) {
+    auto m = from_afar();
+    for (int round = 0; round < rounds; ++round) {
+        m = solved(unit, is_used, m);
+        const auto errors = errors_of(m, unit);
+        auto next = within(errors, most_in_use(errors));
+        if (next == is_used && round > 1) break;
+        is_used = std::move(next);
+    }
+    return m;
+}
+
+// The pairs that lie about where the best of several projections through a few of them puts them: where some are so far
+// off that all together lead nowhere.
+std::vector<bool> agreeing(const std::vector<Pair>& unit) {
+    constexpr int tries = 60, few = 10;
+    double best = std::numeric_limits<double>::infinity();
+    std::vector<bool> out(unit.size(), true);
+    std::uint64_t random = 1;
+    for (int k = 0; k < tries; ++k) {
+        std::vector<bool> chosen(unit.size(), false);
+        for (int i = 0; i < few; ++i) {
+            random = random * 6364136223846793005u + 1442695040888963407u;
+            chosen[static_cast<std::size_t>((random >> 33) % unit.size())] = true;
+        }
+        auto m = solved(unit, chosen, from_afar());
+        m = solved(unit, chosen, m);
+        const auto errors = errors_of(m, unit);
+        const double median = median_of(errors);
+        if (!(median < best)) continue;
+        best = median;
+        out = within(errors, most_in_use(errors));
+    }
+    return out;
+}
+
+// In pixels, of pairs as they are. all: begun with all of them, else with those that agree.
+ProjectionMatrix fitted(const std::vector<Pair>& pairs, const FilmPairs& film, bool all) {
     const auto of_positions = normalisation_of(pairs);
     const double scale = std::max(film.width, film.height) / 2;
     std::vector<Pair> unit;
     for (const auto& pair : pairs)
         unit.push_back({(pair.position - of_positions.middle) / of_positions.size,
                         (pair.place - Eigen::Vector2d(film.width, film.height) / 2) / scale});
-    std::vector<bool> is_used(unit.size(), true);
-    ProjectionMatrix m = ProjectionMatrix::Zero();
-    m(2, 3) = 1;
-    for (int round = 0; round < rounds; ++round) {
-        m = solved(unit, is_used, m);
-        const auto errors = errors_of(m, unit);
-        // At least what single precision rounds to stays in use.
-        const double most = std::max(3 * median_of(errors), 1e-7);
-        std::vector<bool> next(unit.size());
-        for (std::size_t i = 0; i < unit.size(); ++i) next[i] = errors[i] <= most;
-        if (next == is_used && round > 1) break;
-        is_used = std::move(next);
-    }
+    const auto m = refined(unit, all ? std::vector<bool>(unit.size(), true) : agreeing(unit));
     Eigen::Matrix4d to_unit = Eigen::Matrix4d::Identity();
     to_unit.topLeftCorner<3, 3>() /= of_positions.size;
     to_unit.topRightCorner<3, 1>() = -of_positions.middle / of_positions.size;
@@ -169,9 +210,12 @@ ProjectionErrors projection_errors(const ProjectionMatrix& projection, const Fil
 std::optional<ProjectionMatrix> fit_projection(const FilmPairs& pairs) {
     const auto telling = telling_pairs(pairs);
     if (telling.size() < fewest_pairs) return std::nullopt;
-    const auto found = fitted(evenly_chosen(telling, most_fitted), pairs);
-    if (!found.allFinite() || !is_projection(errors_between(found, telling))) return std::nullopt;
-    return of_pixels(found, pairs);
+    const auto chosen = evenly_chosen(telling, most_fitted);
+    for (const bool all : {true, false}) {
+        const auto found = fitted(chosen, pairs, all);
+        if (found.allFinite() && is_projection(errors_between(found, telling))) return of_pixels(found, pairs);
+    }
+    return std::nullopt;
 }
 
 std::optional<ProjectionMatrix> follow_projection(const ProjectionMatrix& before, const FilmPairs& pairs) {

@@ -106,18 +106,6 @@ TEST(FilmedFrames, OfOneReferenceHaveOneTopologyAndPlacesOfTheirOwn) {
     EXPECT_NE(frames[2].mesh.texcoords, frames[0].mesh.texcoords);
 }
 
-TEST(FilmedFrames, WithAPatchAreTheEncoders) {
-    const auto coded = encode(filmed(turned(two_balls(6))), filmed_options());
-    ASSERT_TRUE(coded.errors.empty());
-    const auto whole = decoded_frames(coded.packets);
-    std::size_t patched = 0;
-    for (const auto& info : coded.infos) patched += info.type == FrameType::patched ? 1 : 0;
-    EXPECT_EQ(whole.size(), coded.infos.size());
-    for (std::size_t i = 0; i < whole.size(); ++i)
-        EXPECT_EQ(whole[i].mesh.texcoords, coded.reconstructions[i].texcoords) << kind_of(coded.infos[i].type).letter;
-    EXPECT_GT(patched, 0u) << "the horn that comes elsewhere is a patch";
-}
-
 TEST(FilmedFrames, OfACameraThatStaysTakeAsManyBytesAsWithoutIt) {
     const auto sequence = filmed(horned_ball(4, 9));
     const auto stays = encode(sequence, filmed_options());

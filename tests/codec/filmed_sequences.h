@@ -53,14 +53,6 @@ inline TestSequence filmed(TestSequence sequence, double step = 0) {
     return sequence;
 }
 
-// By half a right angle, so that the camera sees both places of a horn.
-inline TestSequence turned(TestSequence sequence) {
-    constexpr float half = 0.70710678f;
-    for (auto& frame : sequence.frames)
-        for (auto& p : frame.mesh.positions) p = {half * (p[0] - p[2]), p[1], half * (p[0] + p[2])};
-    return sequence;
-}
-
 inline EncoderOptions filmed_options() {
     auto out = patched_options();
     out.texture = {TextureLayout::projection, 512, 256};

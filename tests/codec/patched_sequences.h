@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
 #include "codec/ball.h"
 #include "codec/enhanced_options.h"
@@ -30,25 +29,6 @@ inline TestSequence horned_ball(int frames, int lost = 2, double horn = 150, dou
         out.frames.push_back(std::move(frame));
     }
     return meshed_anew(std::move(out));
-}
-
-// The horned ball, and beside it a bumpy one that stays: without colours an I-frame of the first alone would take
-// hardly more than a patch does.
-inline TestSequence two_balls(int frames) {
-    auto out = horned_ball(frames);
-    const auto beside = ball(4, [](const Vector3d& d) {
-        return 300 + 2 * std::sin(9 * d[0]) * std::sin(11 * d[1]) * std::sin(7 * d[2] + 1);
-    });
-    for (auto& frame : out.frames) {
-        auto& mesh = frame.mesh;
-        const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-        for (const auto& p : beside.positions) {
-            mesh.positions.push_back({static_cast<float>(p.x + 900), static_cast<float>(p.y), static_cast<float>(p.z)});
-            mesh.colours.push_back({90, 120, 150});
-        }
-        for (const auto& [a, b, c] : beside.triangles) mesh.triangles.push_back({first + a, first + b, first + c});
-    }
-    return out;
 }
 
 inline EncoderOptions patched_options() {
