@@ -5,7 +5,7 @@ import { join } from 'node:path';
 import { crc32 } from './crc32.mjs';
 
 const OK = 0, AGAIN = 1, BAD_INPUT = -1, CORRUPT_STREAM = -2;
-const COLOURS = 1, NORMALS = 2, TEXCOORDS = 4;
+const COLOURS = 1, NORMALS = 2, TEXCOORDS = 4, MOVING_TEXCOORDS = 8;
 const infoSize = 72;      // sizeof(htvm_frame_info)
 const viewSize = 36;      // sizeof(htvm_mesh_view)
 const optionsSize = 56;   // sizeof(htvm_decoder_options)
@@ -96,7 +96,8 @@ function kindLetter(library, type) {
     return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
 }
 
-// As a player would: triangles and texture coordinates are taken only where the topology number is a new one.
+// As a player would: triangles are taken only where the topology number is a new one, and so are texture coordinates that
+// do not move.
 function digestLine(decoder, info, kept) {
     const lent = decoder.mesh();
     if (lent.topology !== kept.topology) {
@@ -104,6 +105,7 @@ function digestLine(decoder, info, kept) {
         kept.triangles = lent.indices.slice();
         kept.texcoords = lent.texcoords.slice();
     }
+    if (info.attributes & MOVING_TEXCOORDS) kept.texcoords = lent.texcoords.slice();
     const arrays = [lent.positions, kept.triangles, lent.colours, lent.normals, kept.texcoords];
     const digest = crc32(Buffer.concat(arrays)).toString(16).padStart(8, '0');
     return `${info.frame} ${kindLetter(decoder.library, info.type)[0]} ${info.vertices} ${info.triangles} ${digest}\n`;
