@@ -66,7 +66,7 @@ def in_millimetres(mesh, header):
             out[name] = [float32(n[k] * scale) for n, scale in zip(mesh.normals, scales)]
     if mesh.texcoords:
         for k, name in enumerate(("s", "t")):
-            out[name] = [float32(t[k] / (65536.0 if header.layout == 2 else 4096.0)) for t in mesh.texcoords]
+            out[name] = [float32(t[k] / (65536.0 if header.layout in (2, 3) else 4096.0)) for t in mesh.texcoords]
     if mesh.colours:
         for k, name in enumerate(("red", "green", "blue")):
             out[name] = [c[k] for c in mesh.colours]

@@ -526,9 +526,10 @@ Mesh Encoder::reconstruction() const {
     return state_->queued.decoded.empty() ? Mesh() : reconstruction(state_->queued.decoded.size() - 1);
 }
 Mesh Encoder::reconstruction(std::size_t coded) const {
-    const bool captured = state_->configuration.options.texture.layout == TextureLayout::captured;
+    const auto layout = state_->configuration.options.texture.layout;
+    const bool own = layout == TextureLayout::charts || layout == TextureLayout::projection;
     return to_mesh(state_->queued.decoded[coded].mesh, state_->configuration.header.lattice,
-                   captured ? captured_texcoord_unit : chart_texcoord_unit);
+                   own ? chart_texcoord_unit : captured_texcoord_unit);
 }
 std::span<const std::uint32_t> Encoder::repeated_vertices() const {
     return state_->queued.decoded.empty() ? std::span<const std::uint32_t>()
