@@ -605,15 +605,18 @@ void Capture::tell_of_texture() const {
     const auto& texture = peeked_->texture;
     const bool is_default = options_.texture_as == TextureAs::by_default;
     if (texture && keeps_pictures(texture_as_)) {
-        note(fmt::format("the texture ({}, {} x {} pixels) is {}{}", image, texture->width, texture->height,
-                         texture_as_ == TextureAs::keep      ? "kept as it is"
-                         : texture_as_ == TextureAs::picture ? "drawn anew in a layout that lasts, and coded as video"
-                         : texture_as_ == TextureAs::projection
-                             ? "one camera's film, and coded as video with that camera's projection"
-                             : "coded as video, with its coordinates as captured",
-                         is_default ? "; --texture-as colours has its colours at the vertices instead, without its "
-                                      "details, in less time and with fewer bits"
-                                    : ""));
+        note(
+            fmt::format("the texture ({}, {} x {} pixels) is {}{}", image, texture->width, texture->height,
+                        texture_as_ == TextureAs::keep      ? "kept as it is"
+                        : texture_as_ == TextureAs::picture ? "drawn anew in a layout that lasts, and coded as video"
+                        : texture_as_ == TextureAs::projection
+                            ? "one camera's film, and coded as video with that camera's projection"
+                            : "coded as video, with its coordinates as captured",
+                        !is_default ? ""
+                        : texture_as_ == TextureAs::projection
+                            ? "; --texture-as colours has its colours at the vertices instead, without its details"
+                            : "; --texture-as colours has its colours at the vertices instead, without its details, in "
+                              "less time and with fewer bits"));
     } else if (texture) {
         note(fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices{}", image,
                          texture->width, texture->height,

@@ -19,6 +19,7 @@
 #include "command_line/capture.h"
 #include "command_line/choice.h"
 #include "command_line/headings.h"
+#include "command_line/interruption.h"
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
 #include "commands.h"
@@ -482,6 +483,7 @@ void begin_at_first(Decoding& d) {
 }
 
 tl::unexpected<Error> not_a_stream(const Options& options) {
+    if (interruption() != 0) return fail(ErrorKind::bad_input, options.input + ": interrupted before a stream began");
     return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
 }
 

@@ -204,9 +204,8 @@ FrontPage front_page() {
             {"--frames", "Use at most so many frames (default: all)"},
             {"--skeleton", "The tracked skeleton, if there is one: JSON or BVH"},
             {"--texture-as",
-             "What becomes of a texture: picture (default), which is coded as video and keeps\n"
-             "details (projection where it is one camera's film), or colours at the vertices: less time, fewer bits; "
-             "--help-all has the others"},
+             "What becomes of a texture: video, which keeps details (default: picture, or projection where it is one "
+             "camera's film), or colours at the vertices: less time, fewer bits; others in --help-all"},
             {"--audio", "Sound that begins with the first frame"},
             {"--deadline", "Live: milliseconds that a frame may take; where time is short, less is searched"},
         },

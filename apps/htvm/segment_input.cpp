@@ -107,6 +107,10 @@ std::string_view text_of(const std::vector<std::uint8_t>& bytes) {
 
 Result<void> SegmentInput::read_list(const FetchedFile& file) {
     auto list = read_playlist(text_of(file.bytes));
+    if (!list && source_.waits && !text_of(file.bytes).starts_with("#EXTM3U"))
+        return fail(list.error().kind, shown_ +
+                                           " is no playlist: of a stream's addresses, programs read those that end "
+                                           "in .m3u8, and a hub's that begin with ws:// or wss://");
     if (!list) return fail(list.error().kind, shown_ + ": " + list.error().message);
     list_ = std::move(*list);
     list_place_ = file.place;
@@ -120,6 +124,13 @@ Result<SegmentInput> SegmentInput::open(const std::string& place, std::uint64_t 
     out.shown_ = shown_place(place);
     out.source_ = {fetch_beside, false};
     if (live::looks_like_web_address(place)) {
+        // An endless answer, which no list of segments is.
+        const auto address = live::parse_web_address(place);
+        const bool of_hub = address && address->target.starts_with("/watch/");
+        if (of_hub && address->target.substr(0, address->target.find('?')).find(".m3u8") == std::string::npos)
+            return fail(ErrorKind::bad_input, out.shown_ +
+                                                  " is a hub's live stream: its address begins with ws:// in place of "
+                                                  "http://, wss:// in place of https://");
         auto source = source_by_http(place, trust);
         if (!source) return tl::unexpected(source.error());
         out.source_ = std::move(*source);

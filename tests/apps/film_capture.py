@@ -1,6 +1,7 @@
 """A capture whose texture is one camera's film: film_capture.py MESHES OUT gives the meshes of a folder of PLY files, as
 frame_N.obj, texture coordinates as a camera 3 m before the person has them, who moves to the right from frame to frame, and
 images of 320 x 240 pixels. The last frame's coordinates are none of a camera's with a third argument, bent."""
+import math
 import os
 import struct
 import sys
@@ -36,7 +37,7 @@ def main(meshes, out, bent=False):
                 depth = 3000 - z
                 u, v = 0.5 + 0.5 * (x - 8 * number) / depth, 0.5 + 0.8 * (y - 900) / depth
                 if bent and number == len(names) - 1:
-                    u *= u
+                    u += 0.03 * math.sin(200 * u)
                 file.write("vt %.9g %.9g\n" % (u, v))
             for corners in triangles:
                 file.write("f %s\n" % " ".join("%d/%d" % (corner + 1, corner + 1) for corner in corners))

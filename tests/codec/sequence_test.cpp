@@ -211,8 +211,8 @@ TEST(SequenceHeader, AnotherVersionIsUnsupported) {
     const auto read = read_sequence_header(bytes);
     ASSERT_FALSE(read.has_value());
     EXPECT_EQ(read.error().kind, ErrorKind::unsupported);
-    EXPECT_NE(read.error().message.find("version 8"), std::string::npos) << read.error().message;
-    EXPECT_NE(read.error().message.find("versions 1 to 7; a newer htvm"), std::string::npos) << read.error().message;
+    EXPECT_NE(read.error().message.find("version 9"), std::string::npos) << read.error().message;
+    EXPECT_NE(read.error().message.find("versions 1 to 8; a newer htvm"), std::string::npos) << read.error().message;
     bytes[4] = 0;
     EXPECT_EQ(read_sequence_header(bytes).error().kind, ErrorKind::unsupported);
     bytes[0] = 'x';

@@ -4,9 +4,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openssl/evp.h>
-#include <openssl/pem.h>
-#include <openssl/x509v3.h>
 
 #include <atomic>
 #include <boost/asio/ssl.hpp>
@@ -19,6 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "certificate.h"
 #include "live/server/credentials.h"
 #include "live_packets.h"
 #include "server_test.h"
@@ -49,31 +47,8 @@ TEST(Authority, ItsAddressIsOneOfHttp) {
         EXPECT_FALSE(Authority::open({.url = wrong})) << wrong;
 }
 
-// A certificate that vouches for itself, and its key, both in one file.
-void write_certificate(const std::string& path, const std::string& subject_alternative_name) {
-    const std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)> key(EVP_EC_gen("P-256"), EVP_PKEY_free);
-    const std::unique_ptr<X509, decltype(&X509_free)> certificate(X509_new(), X509_free);
-    X509_set_version(certificate.get(), 2);
-    ASN1_INTEGER_set(X509_get_serialNumber(certificate.get()), 1);
-    X509_gmtime_adj(X509_getm_notBefore(certificate.get()), -60);
-    X509_gmtime_adj(X509_getm_notAfter(certificate.get()), 3600);
-    X509_set_pubkey(certificate.get(), key.get());
-    X509_NAME* name = X509_get_subject_name(certificate.get());
-    X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_ASC, reinterpret_cast<const unsigned char*>("service"), -1, -1, 0);
-    X509_set_issuer_name(certificate.get(), name);
-    const std::unique_ptr<X509_EXTENSION, decltype(&X509_EXTENSION_free)> alternative(
-        X509V3_EXT_conf_nid(nullptr, nullptr, NID_subject_alt_name, subject_alternative_name.c_str()),
-        X509_EXTENSION_free);
-    X509_add_ext(certificate.get(), alternative.get(), -1);
-    ASSERT_GT(X509_sign(certificate.get(), key.get(), EVP_sha256()), 0);
-    const std::unique_ptr<FILE, decltype(&std::fclose)> file(std::fopen(path.c_str(), "w"), std::fclose);
-    ASSERT_TRUE(file);
-    ASSERT_EQ(PEM_write_X509(file.get(), certificate.get()), 1);
-    ASSERT_EQ(PEM_write_PrivateKey(file.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr), 1);
-}
-
 // A service that answers each question by what a test gives: a status and headers; 0: never. By TLS if it has a
-// certificate.
+// certificate, beside which is its key, NAME.key.
 class Service {
 public:
     explicit Service(std::function<std::pair<unsigned, std::string>(const nlohmann::json&)> answer,
@@ -82,7 +57,7 @@ public:
         if (!certificate.empty()) {
             tls_.emplace(net::ssl::context::tls_server);
             tls_->use_certificate_file(certificate, net::ssl::context::pem);
-            tls_->use_private_key_file(certificate, net::ssl::context::pem);
+            tls_->use_private_key_file(certificate + ".key", net::ssl::context::pem);
         }
         thread_ = std::thread([this] { run(); });
     }
@@ -231,8 +206,8 @@ TEST_F(AskedServerTest, AServiceThatIsNotThereLetsNobodyIn) {
 
 TEST_F(AskedServerTest, OneByTlsIsBelievedIfItsCertificateIsTrustedAndForItsAddress) {
     const auto certificate = (root / "service.pem").string(), other = (root / "other.pem").string();
-    write_certificate(certificate, "IP:127.0.0.1");
-    write_certificate(other, "IP:127.0.0.2");
+    write_certificate(certificate, certificate + ".key", "service", "IP:127.0.0.1");
+    write_certificate(other, other + ".key", "service", "IP:127.0.0.2");
     const auto status_by = [&](const std::string& shown, const std::string& trusted) {
         Service service([](const nlohmann::json&) { return std::pair(200u, std::string()); }, shown);
         options.authority.url = service.url();

@@ -161,6 +161,20 @@ TEST(Watcher, WaitsNoLongerThanItIsToldAndEndsWhereItIsStopped) {
     EXPECT_FALSE(*ended);
 }
 
+TEST(Watcher, ARefusalEndsItAtOnce) {
+    std::atomic<int> connections = 0;
+    const FakeHub hub(accepting([&](Socket& socket) {
+        ++connections;
+        beast::error_code ignored;
+        socket.close({beast::websocket::close_code::policy_error, "this needs a link"}, ignored);
+    }));
+    auto watcher = Watcher::open(hub.url("/watch/anna")).value();
+    const auto came = watcher.next();
+    ASSERT_FALSE(came);
+    EXPECT_NE(came.error().message.find("this needs a link"), std::string::npos) << came.error().message;
+    EXPECT_EQ(connections, 1);
+}
+
 TEST(Publisher, AHubThatIsKilledAndBackIsSentWhatTheNewestFrameNeeds) {
     std::optional<TestHub> hub(std::in_place);
     const auto port = hub->port();

@@ -2,8 +2,6 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openssl/evp.h>
-#include <openssl/pem.h>
 #include <openssl/x509.h>
 #include <unistd.h>
 
@@ -15,6 +13,7 @@
 #include <mutex>
 #include <optional>
 
+#include "certificate.h"
 #include "live/server/credentials.h"
 #include "live_packets.h"
 #include "server_test.h"
@@ -30,30 +29,6 @@ using std::chrono::seconds;
 using std::chrono::system_clock;
 using testing::HasSubstr;
 using testing::MatchesRegex;
-
-// A certificate of its own for this name, with its key.
-void write_certificate(const std::string& certificate, const std::string& private_key, const std::string& name) {
-    EVP_PKEY* key = EVP_EC_gen("P-256");
-    X509* x509 = X509_new();
-    X509_set_version(x509, X509_VERSION_3);
-    ASN1_INTEGER_set(X509_get_serialNumber(x509), 1);
-    X509_gmtime_adj(X509_getm_notBefore(x509), -3600);
-    X509_gmtime_adj(X509_getm_notAfter(x509), 3600);
-    X509_set_pubkey(x509, key);
-    X509_NAME* subject = X509_get_subject_name(x509);
-    X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_ASC, reinterpret_cast<const unsigned char*>(name.c_str()), -1,
-                               -1, 0);
-    X509_set_issuer_name(x509, subject);
-    X509_sign(x509, key, EVP_sha256());
-    std::FILE* file = std::fopen(certificate.c_str(), "w");
-    PEM_write_X509(file, x509);
-    std::fclose(file);
-    file = std::fopen(private_key.c_str(), "w");
-    PEM_write_PrivateKey(file, key, nullptr, nullptr, 0, nullptr, nullptr);
-    std::fclose(file);
-    X509_free(x509);
-    EVP_PKEY_free(key);
-}
 
 class ServerAccessTest : public ServerTest {
 protected:
@@ -154,6 +129,32 @@ TEST_F(ServerAccessTest, APublisherWhoIsAddedIsKnownAfterAHangup) {
     std::ofstream(options.admission.publishers) << "{";
     hang_up_and_wait_for("reload_failed");
     EXPECT_EQ(opened("/publish/ben?token=" + ben), 101u);
+}
+
+TEST_F(ServerAccessTest, AFolderInPlaceOfAFileChangesNothingAtAHangup) {
+    for (auto* place :
+         {&options.admission.publishers, &options.admission.link_keys, &options.admission.web_token_keys}) {
+        options.admission = {};
+        options.admission.refusal_delay = {};
+        *place = file("who");
+        fs::create_directory(*place);
+        EXPECT_THAT(Server::open(options).error().message, HasSubstr(*place + ": it is a folder"));
+        fs::remove(*place);
+    }
+    options.admission = {};
+    options.admission.refusal_delay = {};
+    options.admission.publishers = file("publishers.json");
+    const auto anna = add_publisher(options.admission.publishers, "anna").value();
+    start();
+    const auto away = file("away.json");
+    fs::rename(options.admission.publishers, away);
+    fs::create_directory(options.admission.publishers);
+    hang_up_and_wait_for("reload_failed");
+    EXPECT_EQ(opened("/publish/anna?token=" + anna), 101u);
+    fs::remove(options.admission.publishers);
+    fs::rename(away, options.admission.publishers);
+    hang_up_and_wait_for("reloaded");
+    EXPECT_EQ(opened("/publish/anna?token=" + anna), 101u);
 }
 
 TEST_F(ServerAccessTest, NamesThatAreNoNamesOfStreamsAreNotPublished) {
@@ -376,6 +377,9 @@ TEST_F(ServerAccessTest, ACertificateAndAKeyThatDoNotBelongTogetherAreRefused) {
     options.certificate = file("a.pem");
     options.private_key = file("b.key");
     EXPECT_THAT(Server::open(options).error().message, HasSubstr("b.key"));
+    write_certificate(file("c.pem"), file("c.key"), "c.example", "", KeyKind::rsa);
+    options.certificate = file("c.pem");
+    EXPECT_THAT(Server::open(options).error().message, HasSubstr("b.key")) << "another kind of key";
     options.certificate = file("none.pem");
     EXPECT_THAT(Server::open(options).error().message, HasSubstr("none.pem"));
 }

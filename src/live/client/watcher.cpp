@@ -112,6 +112,7 @@ Result<Watcher> Watcher::open(const std::string& url, const WatcherOptions& opti
     client.insecure = options.insecure;
     client.token = options.token;
     client.largest_message = options.largest_packet + packet_overhead;
+    client.patience = {};  // only publishers are refused for a moment
     auto created = HubClient::create({std::move(*address)}, client, state->talk());
     if (!created) return tl::unexpected(created.error());
     state->client.emplace(std::move(*created));

@@ -10,13 +10,12 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 
 #include "live/hub/stream_name.h"
+#include "live/server/access_file.h"
 #include "live/server/http_request.h"
 
 namespace htvm::live {
@@ -87,10 +86,9 @@ std::array<std::uint8_t, 32> signature_of(const LinkKey& key, std::uint32_t numb
 }
 
 Result<Json> read_json(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    if (!in) return fail(ErrorKind::bad_input, "cannot read " + path + ": " + std::strerror(errno));
-    const std::string text{std::istreambuf_iterator<char>(in), {}};
-    auto json = Json::parse(text, nullptr, false);
+    const auto text = read_access_file(path);
+    if (!text) return tl::unexpected(text.error());
+    auto json = Json::parse(*text, nullptr, false);
     if (!json.is_object()) return fail(ErrorKind::bad_input, path + " is not a JSON object");
     return json;
 }

@@ -58,6 +58,10 @@ Result<std::optional<net::ssl::context>> read_certificate(const ServerOptions& o
     if (error)
         return fail(ErrorKind::bad_input,
                     "no key of that certificate can be read from " + options.private_key + ": " + error.message());
+    // A key of another kind is read without complaint.
+    if (SSL_CTX_check_private_key(native) != 1)
+        return fail(ErrorKind::bad_input,
+                    "the key in " + options.private_key + " is not that of the certificate in " + options.certificate);
     return std::optional(std::move(context));
 }
 
@@ -179,8 +183,9 @@ struct Server::State {
     std::vector<std::unique_ptr<LineThread>> line_threads;
     Context context;
     tcp::acceptor acceptor{context};
-    std::optional<Authority> authority;  // if there is one
-    std::optional<NatsPeering> nats;     // if the hub is joined with others
+    std::optional<net::signal_set> hangup{};  // at which files are read again, where there are any
+    std::optional<Authority> authority;       // if there is one
+    std::optional<NatsPeering> nats;          // if the hub is joined with others
     SharedTexts texts{site, context.get_executor()};
 
     explicit State(const ServerOptions& given)
@@ -333,9 +338,8 @@ net::awaitable<void> Server::State::each_second() {
 }
 
 net::awaitable<void> Server::State::reload_on_hangup() {
-    net::signal_set hangup(context, SIGHUP);
     for (;;) {
-        co_await hangup.async_wait(awaited);
+        co_await hangup->async_wait(awaited);
         if (options.reload) options.reload();
         if (const auto read = read_access_files())
             tell({.name = "reloaded", .text = "certificate, publishers and keys were read again"});
@@ -400,6 +404,11 @@ Result<Server> Server::open(const ServerOptions& options) {
         state->site.authority = &state->authority.emplace(std::move(*authority));
     }
     if (options.hub && options.recorder) record(*options.hub, *options.recorder);
+    const auto& who = options.admission;
+    // Before anybody knows that this server is there: without it, the signal ends the program.
+    if (!options.certificate.empty() || !who.publishers.empty() || !who.link_keys.empty() ||
+        !who.web_token_keys.empty() || !who.revoked.empty() || options.reload)
+        state->hangup.emplace(state->context, SIGHUP);
     return Server(std::move(state));
 }
 
@@ -419,10 +428,7 @@ void Server::State::run() {
     net::co_spawn(context, each_second(), net::detached);
     if (options.hub) net::co_spawn(context, tick_hub(), net::detached);
     net::co_spawn(context, drain_on_signal(), net::detached);
-    const auto& who = options.admission;
-    const bool files = !options.certificate.empty() || !who.publishers.empty() || !who.link_keys.empty() ||
-                       !who.web_token_keys.empty() || !who.revoked.empty();
-    if (files || options.reload) net::co_spawn(context, reload_on_hangup(), net::detached);
+    if (hangup) net::co_spawn(context, reload_on_hangup(), net::detached);
     for (const auto& one : line_threads) one->thread = std::thread([&one] { one->context.run(); });
     context.run();
     for (const auto& one : line_threads) one->context.stop();

@@ -13,14 +13,13 @@
 #include <openssl/x509.h>
 
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
+
+#include "live/server/access_file.h"
 
 namespace htvm::live {
 namespace {
@@ -279,12 +278,15 @@ std::optional<Parts> parts_of(std::string_view token) {
 }  // namespace
 
 Result<WebTokenKeys> read_web_token_keys(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    if (!in) return fail(ErrorKind::bad_input, "cannot read " + path + ": " + std::strerror(errno));
-    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    const auto text = read_access_file(path);
+    if (!text) return tl::unexpected(text.error());
+    if (text->find("PRIVATE KEY-----") != std::string::npos)
+        return fail(ErrorKind::bad_input, path +
+                                              " holds a private key, which only who signs tokens may have; give its "
+                                              "public key (openssl pkey -in KEY -pubout)");
     WebTokenKeys out;
-    const auto json = Json::parse(text, nullptr, false);
-    const bool read = json.is_object() ? read_key_set(json, out) : read_pem(text, out);
+    const auto json = Json::parse(*text, nullptr, false);
+    const bool read = json.is_object() ? read_key_set(json, out) : read_pem(*text, out);
     if (!read || out.empty() || out.size() > most_web_token_keys)
         return fail(ErrorKind::bad_input, path + " must hold 1 to " + std::to_string(most_web_token_keys) +
                                               " public keys, PEM or JWKS: RSA of 2048 to 8192 bits, or P-256");
