@@ -515,8 +515,9 @@ void print_totals(const Inspection& in) {
     if (!in.options.summary)
         fmt::print(
             "bpv: bits per captured vertex, as from pose/transforms on; vertices and triangles: of the decoded "
-            "mesh\n"
+            "mesh{}\n"
             "*: a place to start, as every I- and TP-frame is\n{}\n",
+            found.leveled_frames > 0 ? ", of an I-frame with levels without its detail" : "",
             found.has_groups
                 ? "T1/8: the first of a group of eight T-frames; its packet, and others, bring frames that follow\n"
                 : "");
