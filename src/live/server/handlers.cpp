@@ -211,9 +211,10 @@ net::awaitable<std::optional<Refusal>> ask_authority(const Site& site, const cha
     const auto answer = co_await site.authority->ask(std::move(question));
     if (answer == Answer::yes) co_return std::nullopt;
     otherwise.cause = answer == Answer::no ? "authority" : "authority_silent";
-    otherwise.why = "whom this hub asks does not allow it";
+    otherwise.why =
+        "the web service that this hub asks does not allow it: a token or a link is missing, or no longer good";
     if (answer == Answer::no) co_return otherwise;
-    otherwise.why = "this hub has no answer yet from whom it asks whether this is allowed";
+    otherwise.why = "the web service that this hub asks has not answered";
     otherwise.status = http::status::service_unavailable;
     otherwise.code = CloseCode::try_later;
     co_return otherwise;
