@@ -160,6 +160,18 @@ Result<void> add_link_key(const Options& options) {
     return {};
 }
 
+// Options that say nothing without another, and so leave open what was meant to be closed.
+Result<void> check_who_may(const live::ServerOptions& server) {
+    const auto& who = server.admission;
+    const bool asks = !server.authority.url.empty() || !who.web_token_keys.empty();
+    if (!asks && !(who.guard_publishing && who.guard_watching))
+        return fail(ErrorKind::bad_input, "--auth-for says what --auth and --jwt-keys are for: add one of them");
+    if (!who.revoked.empty() && who.link_keys.empty() && who.web_token_keys.empty())
+        return fail(ErrorKind::bad_input,
+                    "--revoked takes links and tokens back: add --link-keys or --jwt-keys, which say what these are");
+    return {};
+}
+
 Result<void> serve(const Options& options) {
     const auto log =
         live::limited([json = options.json](const live::Event& event) { write_event(event, json); }, told_each_second);
@@ -188,6 +200,7 @@ Result<void> serve(const Options& options) {
         settings.part_seconds = options.part_seconds;
         server.segments = &segments.emplace(settings, hub);
     }
+    if (auto ok = check_who_may(server); !ok) return ok;
     server.log = log;
     allow_files(server.admission.connections);
     auto opened = live::Server::open(server);

@@ -40,6 +40,10 @@ expect 1 "a.pem" "$htvm" serve --cert a.pem --key a.key
 expect 2 "--viewers" "$htvm" serve --viewers 0
 expect 2 "--record-minutes requires --record" "$htvm" serve --record-minutes 5
 expect 1 "there is no folder none" "$htvm" serve --port 0 --record none
+expect 1 "add one of them" "$htvm" serve --port 0 --auth-for publish
+expect 1 "add --link-keys or --jwt-keys" "$htvm" serve --port 0 --revoked none.txt
+mkdir folder.json
+expect 1 "folder.json: it is a folder" "$htvm" serve --port 0 --publishers folder.json
 expect 0 "--viewers-per-address" "$htvm" serve --help-all
 expect 0 "(default 1024 MiB)" "$htvm" serve --help-all
 # With NATS or without, the option is known, and what is wrong is said in a sentence.
