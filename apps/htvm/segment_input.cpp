@@ -291,7 +291,7 @@ bool SegmentInput::is_known(const Packet& packet) {
     return false;
 }
 
-// Of the first packets behind a gap those that did not come before; all of the others.
+// Those of the first packets behind a gap that did not come before; all of the others.
 std::vector<std::uint8_t> SegmentInput::without_repeats(std::vector<std::uint8_t> bytes) {
     const bool filters = std::exchange(filters_, false);
     PacketReader reader(static_cast<std::size_t>(std::min<std::uint64_t>(max_packet_bytes_, SIZE_MAX)));

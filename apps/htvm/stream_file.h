@@ -52,9 +52,9 @@ public:
     bool is_live() const;
     std::uint64_t damaged_bytes() const;
     std::uint64_t oversized_packets() const { return reader_.oversized_packets(); }
-    // Of a file that is cut short: bytes that it tells of and has not.
+    // Bytes that a file which is cut short tells of and has not.
     std::uint64_t missing_bytes() const;
-    // Of a playlist: segments that are gone or cut short, and of the first one what is wrong with it, as a sentence
+    // A playlist's segments that are gone or cut short, and what is wrong with the first of them, as a sentence
     // without its end.
     std::uint64_t lost_segments() const;
     std::string first_loss() const;

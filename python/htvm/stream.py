@@ -52,7 +52,7 @@ class Frame(Mesh):
     kind: str = ""  # "I", "EP", "P", "T" or "TP": docs/glossary.md
     reason: Optional[str] = None  # why an I- or TP-frame was sent, "due" or "region": docs/bitstream.md, 8.20; None: not told
     bytes: int = 0  # of its packet
-    # Of frames of one iteration, the same if they have the same triangles and texcoords; but where the texture is one
+    # The same for frames of one iteration if they have the same triangles and texcoords; but where the texture is one
     # camera's film, each frame has texcoords of its own.
     topology: int = 0
     reference_topology: int = 0  # likewise, the same if they have the same vertices and texcoords

@@ -66,7 +66,7 @@ double median_of(std::vector<double> values) {
     return *middle;
 }
 
-// Of these pairs, about the origin and of about unit size, in the least squares of the homogeneous equations, each
+// Solves for these pairs, about the origin and of about unit size, the homogeneous equations in least squares, each
 // divided by what the depth was before, so that what is made small is about the error on the film.
 ProjectionMatrix solved(const std::vector<Pair>& pairs, const std::vector<bool>& is_used,
                         const ProjectionMatrix& before) {

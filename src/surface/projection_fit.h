@@ -10,7 +10,8 @@
 
 namespace htvm::internal {
 
-// Of the same vertices. Coordinates at or beyond the image's border say nothing, as writers cut them off there.
+// Positions and coordinates of the same vertices. Coordinates at or beyond the image's border say nothing, as writers
+// cut them off there.
 struct FilmPairs {
     std::span<const Eigen::Vector3d> positions;
     std::span<const Vector2f> texcoords;  // (0, 0) is the image's lower left corner, (1, 1) its upper right one

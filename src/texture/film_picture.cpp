@@ -37,7 +37,7 @@ struct Extent {
     double height() const { return bottom - top; }
 };
 
-// Of what the mesh shows; the whole film if that is nothing.
+// The part that the mesh shows; the whole film if that is nothing.
 Extent extent_of(const TexturedMesh& captured) {
     Extent out{1e9, 1e9, -1e9, -1e9};
     for (const auto& t : captured.mesh.triangles) {

@@ -143,7 +143,7 @@ const CodedSequence& patched_with_charts() {
     return coded;
 }
 
-// Of all triangles, in the picture.
+// What all triangles take of the picture.
 double picture_area(const Mesh& mesh) {
     double sum = 0;
     for (const auto& [a, b, c] : mesh.triangles) {

@@ -25,7 +25,7 @@ struct FilmProjection {
 
 bool is_finite(const FilmProjection& projection);
 
-// Of these points, in 2^-16 of the picture, within 0 and 1. What is not before the camera has (0, 0).
+// Where these points lie, in 2^-16 of the picture, within 0 and 1. What is not before the camera has (0, 0).
 void project(const FilmProjection& projection, std::span<const LatticePoint> positions,
              std::vector<QuantisedTexcoord>& out);
 

@@ -242,7 +242,7 @@ std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& sh
                               const SurfacePatchOptions& options) {
     const auto& points = shown.positions;
     const auto& decoded = tracked.decoded;
-    // Of vertices first, of triangles behind them: those that may be seen.
+    // Those of vertices first, those of triangles behind them: of all that may be seen.
     std::vector<std::size_t> sampled;
     std::vector<Point3f> samples, facing;
     std::vector<std::uint32_t> near;
