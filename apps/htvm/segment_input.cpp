@@ -108,9 +108,9 @@ std::string_view text_of(const std::vector<std::uint8_t>& bytes) {
 Result<void> SegmentInput::read_list(const FetchedFile& file) {
     auto list = read_playlist(text_of(file.bytes));
     if (!list && source_.waits && !text_of(file.bytes).starts_with("#EXTM3U"))
-        return fail(list.error().kind, shown_ +
-                                           " is no playlist: of a stream's addresses, programs read those that end "
-                                           "in .m3u8, and a hub's that begin with ws:// or wss://");
+        return fail(list.error().kind, shown_ + ": " + list.error().message +
+                                           "; of a stream's addresses, programs read those that end in .m3u8, and a "
+                                           "hub's that begin with ws:// or wss://");
     if (!list) return fail(list.error().kind, shown_ + ": " + list.error().message);
     list_ = std::move(*list);
     list_place_ = file.place;
