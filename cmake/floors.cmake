@@ -17,8 +17,7 @@ function(htvm_floor name)
 endfunction()
 # htvm_precompile(TARGET HEADERS...): large headers of libraries, read once for all files of a target.
 function(htvm_precompile target)
-  if(HTVM_PRECOMPILED_HEADERS STREQUAL "all" OR
-     (HTVM_PRECOMPILED_HEADERS STREQUAL "programs" AND NOT target MATCHES "^htvm_(surface|encoder)$"))
+  if(HTVM_PRECOMPILED_HEADERS STREQUAL "all" OR (HTVM_PRECOMPILED_HEADERS STREQUAL "tests" AND target MATCHES "^test_"))
     target_precompile_headers(${target} PRIVATE ${ARGN})
   endif()
 endfunction()

@@ -77,10 +77,6 @@ list(FILTER hub_sources EXCLUDE REGEX "/${other_nats_source}$")
 htvm_floor(live_hub SOURCES ${hub_sources} LINKS htvm_live_client ${nats_library})
 file(GLOB server_sources CONFIGURE_DEPENDS src/live/server/*.cpp)
 htvm_floor(live SOURCES ${server_sources} ${player_cpp} LINKS htvm_live_hub htvm_io htvm_container)
-set(live_headers <boost/asio.hpp> <boost/asio/ssl.hpp> <boost/beast/http.hpp> <boost/beast/websocket.hpp>)
-foreach(floor live_client live_hub live)
-  htvm_precompile(htvm_${floor} ${live_headers})
-endforeach()
 if(HTVM_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # clang 14 cannot assemble its check of indirect calls in coroutines.
   # PUBLIC: the floors' tests have coroutines too.
