@@ -162,12 +162,32 @@ TEST(FrameReasons, TellOfACut) {
     EXPECT_EQ(reasons_of(encode(sequence, patched_options())), (std::vector{none, none, cut, none}));
 }
 
-TEST(FrameReasons, TellOfSurfaceThatComesIntoView) {
-    auto options = patched_options();
-    options.geometry_step = 8;  // so coarse that it does not matter how the reference is drawn to what is new
-    const auto coded = encode(seen_down_to({900, 900, 600, 600}), options);
-    EXPECT_EQ(coded.infos[2].type, FrameType::patched);
-    EXPECT_EQ(reasons_of(coded), (std::vector{none, none, border, none}));
+// So coarse that it does not matter how the reference is drawn to what is new.
+EncoderOptions coarse_options() {
+    auto out = patched_options();
+    out.geometry_step = 8;
+    return out;
+}
+
+TEST(FrameReasons, TellOfSurfaceThatComesIntoViewAndIsAddedByTheNextFrame) {
+    const auto coded = encode(seen_down_to({900, 900, 600, 600, 600}), coarse_options());
+    EXPECT_EQ(coded.infos[3].type, FrameType::patched);
+    EXPECT_EQ(reasons_of(coded), (std::vector{none, none, none, border, none}));
+}
+
+TEST(FrameReasons, TellOfWhatIsLostWhereSurfaceComesAndGoesWhenTheNextFrameRepairsIt) {
+    auto open = horned_ball(7, 4, 130, 0.2);
+    for (auto& frame : open.frames) {
+        const auto below = [&](const auto& triangle) {
+            return std::any_of(triangle.begin(), triangle.end(),
+                               [&](std::uint32_t v) { return frame.mesh.positions[v][1] < -150; });
+        };
+        std::erase_if(frame.mesh.triangles, below);
+    }
+    const auto coded = encode(open, patched_options());
+    EXPECT_EQ(coded.infos[4].type, FrameType::tracked);
+    EXPECT_EQ(coded.infos[5].type, FrameType::patched);
+    EXPECT_EQ(reasons_of(coded), (std::vector{none, none, none, none, none, surface, none}));
 }
 
 TEST(FrameReasons, TellOfATextureThatIsLaidOutAnew) {
@@ -200,7 +220,7 @@ TEST(FrameReasons, OfTheBonesStrategyTellOfSceneChangesOfMotionAndOfBits) {
 }
 
 TEST(FrameReasons, AreReadAsTheyWereWritten) {
-    for (const auto& sequence : {horned_ball(5), seen_down_to({900, 900, 600, 600})}) {
+    for (const auto& sequence : {horned_ball(5), seen_down_to({900, 900, 600, 600, 600})}) {
         auto options = patched_options();
         options.key_interval = 4;
         const auto coded = encode(sequence, options);

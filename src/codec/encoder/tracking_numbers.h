@@ -64,10 +64,10 @@ struct TrackingNumbers {
     // ---- Where surface comes and goes: when what is captured beside the tracked mesh is added to it
     AdultMillimetres far_from_seen{10};  // a vertex farther from captured surface that faces as it does is not shown
     AdultMillimetres filled_hole{90};    // rim of a hole of the first mesh that is closed
-    double much_uncovered = 0.03;        // share of the captured surface from which on it is added at once
+    double much_uncovered = 0.03;        // share of the captured surface from which on it is added by the next frame
     AdultMillimetres grown_from{20};     // side of a square as large as what is uncovered in a region, from which on it
     int grown_after = 6;                 // is added, these many frames behind the last patch,
-    AdultMillimetres grown_at_once{80};  // or at once
+    AdultMillimetres grown_soon{80};     // or by the next frame
     double worn_off = 0.004;      // share of the captured surface that is uncovered all together, from which on it is
     int worn_after = 60;          // added these many frames behind the last patch
     int attempts_where_open = 3;  // SurfacePatchOptions::attempts where surface comes and goes: what does not fit by

@@ -796,7 +796,10 @@ public:
           normals_(vertex_normals(decoded.positions, stays.triangles)),
           piece_normals_(vertex_normals(piece.positions, piece.triangles)),
           unclear_(decoded.positions.size(), false) {
-        for (const auto& chain : stays.chains) taken_.emplace_back(chain.sides.size(), false);
+        for (std::uint32_t c = 0; c < stays.chains.size(); ++c) {
+            taken_.emplace_back(stays.chains[c].sides.size(), false);
+            for (std::uint32_t s = 0; s < stays.chains[c].sides.size(); ++s) open_.push_back(open_side({c, s}));
+        }
     }
 
     Join run() {
@@ -816,33 +819,53 @@ private:
     const Capture& capture_;
     const SurfacePatchOptions& options_;
     std::vector<Vector3d> normals_, piece_normals_;
+    // A side of the open border, as partners are looked for.
+    struct OpenSide {
+        Partner at;
+        Vector3d from{}, to{}, facing{};
+        Vector3d middle{};
+        double near = 0;    // how far from it the side of a piece may be that runs along it
+        double within = 0;  // how far such a side's middle may be from its own
+    };
+    std::vector<OpenSide> open_;
     std::vector<std::vector<bool>> taken_;  // sides of the chains that are joined
     std::vector<Triangle> triangles_;
     std::vector<bool> unclear_;
+    std::vector<std::uint32_t> staying_;            // vertices that stay, ascending, once the nearest was looked for,
+    std::optional<NearestPoints> nearest_staying_;  // in the same order
 
     Vector3d piece_point(std::uint32_t v) const { return to_vector(piece_.positions[v]); }
     Vector3d middle_of(std::uint32_t side) const {
         return (piece_point(piece_sides_.from(side)) + piece_point(piece_sides_.to(side))) * 0.5;
     }
 
-    Partner partner_of(std::uint32_t side) const {
+    OpenSide open_side(const Partner& at) const {
         constexpr double most_gaps = 3;
+        const auto side = stays_.chains[at.chain].sides[at.side];
+        const auto from = sides_.from(side), to = sides_.to(side);
+        OpenSide out{at, to_vector(decoded_.positions[from]), to_vector(decoded_.positions[to])};
+        out.facing = normals_[from] + normals_[to];
+        out.middle = (out.from + out.to) * 0.5;
+        out.near = most_gaps * options_.gap * std::max(edge_[from], edge_[to]);
+        out.within = out.near + length(out.to - out.from);
+        return out;
+    }
+
+    Partner partner_of(std::uint32_t side) const {
         const auto middle = middle_of(side);
         const auto along = piece_point(piece_sides_.to(side)) - piece_point(piece_sides_.from(side));
         const auto facing = normal_of(piece_.positions, piece_.triangles[side / 3]);
         Partner out;
         double least = std::numeric_limits<double>::infinity();
-        for (std::uint32_t c = 0; c < stays_.chains.size(); ++c)
-            for (std::uint32_t s = 0; s < stays_.chains[c].sides.size(); ++s) {
-                const auto from = sides_.from(stays_.chains[c].sides[s]), to = sides_.to(stays_.chains[c].sides[s]);
-                const auto a = to_vector(decoded_.positions[from]), b = to_vector(decoded_.positions[to]);
-                const double squared = squared_distance_to_side(middle, a, b);
-                const double near = most_gaps * options_.gap * std::max(edge_[from], edge_[to]);
-                if (squared >= least || squared > near * near) continue;
-                if (dot(along, b - a) > 0 || dot(facing, normals_[from] + normals_[to]) <= 0) continue;
-                least = squared;
-                out = {c, s};
-            }
+        for (const auto& open : open_) {
+            const auto apart = middle - open.middle;
+            if (dot(apart, apart) > open.within * open.within) continue;
+            const double squared = squared_distance_to_side(middle, open.from, open.to);
+            if (squared >= least || squared > open.near * open.near) continue;
+            if (dot(along, open.to - open.from) > 0 || dot(facing, open.facing) <= 0) continue;
+            least = squared;
+            out = open.at;
+        }
         return out;
     }
 
@@ -857,15 +880,20 @@ private:
         for (const auto side : chain.sides) give_up_staying(side);
     }
     void give_up_coming(std::uint32_t side) {
-        const auto near = middle_of(side);
-        double least = std::numeric_limits<double>::infinity();
-        std::uint32_t nearest = none;
-        for (const auto& t : stays_.triangles)
-            for (const auto v : t) {
-                const auto apart = to_vector(decoded_.positions[v]) - near;
-                if (dot(apart, apart) < least) least = dot(apart, apart), nearest = v;
+        if (stays_.triangles.empty()) return;
+        if (!nearest_staying_) {
+            std::vector<bool> stays(decoded_.positions.size(), false);
+            for (const auto& t : stays_.triangles)
+                for (const auto v : t) stays[v] = true;
+            std::vector<Point3f> points;
+            for (std::uint32_t v = 0; v < stays.size(); ++v) {
+                if (!stays[v]) continue;
+                staying_.push_back(v);
+                points.push_back(point_of(decoded_.positions[v]));
             }
-        if (nearest != none) unclear_[nearest] = true;
+            nearest_staying_.emplace(points);
+        }
+        unclear_[staying_[nearest_staying_->nearest(to_floats(middle_of(side))).index]] = true;
     }
 
     // A whole loop of the piece along a whole loop of the open border, from where they are nearest to each other.

@@ -112,11 +112,15 @@ SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& ste
     return out;
 }
 
-// The T-frame with the lost regions replaced; nothing if that is not possible, does not help, or costs about as much as
-// an I-frame. Where regions alone do not help, as where much is a little off, all that is lost is replaced.
+// Whether all that is lost is replaced where to replace lost regions alone does not help, as where much is a little
+// off.
+enum class Replaced { regions, all };
+
+// The T-frame with what is lost replaced; nothing if that is not possible, does not help, or costs about as much as an
+// I-frame.
 Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeRegistration& registered,
                                           const FrameSteps& steps, const EncodedTrackedFrame& tracked,
-                                          FrameReason reason) {
+                                          FrameReason reason, Replaced replaced) {
     using Patched = std::optional<TrackedPatch>;
     const auto& reference = *work.reference;
     const auto lost = std::min(allowed_in_region(work, work.sequence.history.best_fit),
@@ -127,7 +131,7 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
         work.surface, patch_options(work, steps));
     measuring.done("patch");
     for (const auto region_lost : {lost, LatticeUnits(0)}) {
-        if (region_lost.value == 0 && reason == FrameReason::border) break;  // nothing is lost
+        if (region_lost.value == 0 && replaced == Replaced::regions) break;
         StageClock clock(work.stages);
         const auto found = search.find(region_lost);
         clock.done("patch");
@@ -152,21 +156,17 @@ bool just_in_vain(const TrackedWork& work, const std::optional<std::uint32_t>& l
     return last && std::int64_t{work.sequence.next_frame} - *last < numbers.again_after;
 }
 
-// When the reference should grow by what was captured beside it: at once where that is much, as an arm that comes into
-// view; else now and then, by the next frame, since a patch takes the time of two frames and the T-frame that shows it
-// is coded by then.
-enum class Growth { none, next, now };
-Growth growth_due(const TrackedWork& work, const TrackedFit& fit, const VainAttempts& in_vain) {
-    if (!work.configuration.tells_presence() || just_in_vain(work, in_vain.growth)) return Growth::none;
+// Whether the reference should grow by what was captured beside it: soon where that is much, as an arm that comes into
+// view; else now and then.
+bool growth_is_due(const TrackedWork& work, const TrackedFit& fit, const VainAttempts& in_vain) {
+    if (!work.configuration.tells_presence() || just_in_vain(work, in_vain.growth)) return false;
     const auto since = std::int64_t{work.sequence.next_frame} - work.reference->decoded.number;
     const auto& scale = work.configuration.scale;
     const auto wide = fit.widest_uncovered;
-    if (fit.uncovered_share > numbers.much_uncovered || wide > scale.on_lattice(numbers.grown_at_once))
-        return Growth::now;
+    if (fit.uncovered_share > numbers.much_uncovered || wide > scale.on_lattice(numbers.grown_soon)) return true;
     // Rims that are worn off bit by bit, here and there, are never wide.
     const bool worn = since >= numbers.worn_after && fit.uncovered_share > numbers.worn_off;
-    const bool wide_enough = since >= numbers.grown_after && wide > scale.on_lattice(numbers.grown_from);
-    return worn || wide_enough ? Growth::next : Growth::none;
+    return worn || (since >= numbers.grown_after && wide > scale.on_lattice(numbers.grown_from));
 }
 
 // ---- The steps of a choice ------------------------------------------------------------------------------------------
@@ -232,12 +232,13 @@ Result<void> look_for_limbs(const TrackedWork& work, Tracking& tracking, const F
     return {};
 }
 
-// What looks for limbs in every frame, before it is coded.
-void follow_limbs_anyway(const TrackedWork& work, Tracking& tracking) {
-    if (std::exchange(tracking.searched_limbs, true)) return;
+// Looks for limbs, if that was not done yet, and gives whether there were any.
+bool find_limbs(const TrackedWork& work, Tracking& tracking) {
+    if (std::exchange(tracking.searched_limbs, true)) return false;
     auto limbs = find_lost_limbs(work, *tracking.registered, work.stages);
     tracking.registered = std::move(limbs.registered);
     tracking.moved_limbs = limbs.any;
+    return limbs.any;
 }
 
 Result<Frame> as_frame(Result<TrackedIntra> intra) {
@@ -267,16 +268,16 @@ std::optional<FrameReason> why_intra(const TrackedWork& work, bool due, std::opt
     return std::nullopt;
 }
 
-// A TP-frame that adds what was captured beside what is tracked; nothing if there is none to add, which in_vain then
-// says. near: as of code_for_patches().
-Result<std::optional<Frame>> grow(const TrackedWork& work, const NodeRegistration& registered, const FrameSteps& steps,
-                                  std::span<const std::uint32_t> near, VainAttempts& in_vain) {
-    auto tracked = code_for_patches(work, registered, steps, near);
+// The TP-frame that the frame before has asked for; nothing if there is none, which in_vain then says of what was to be
+// added. It takes the time of two T-frames: so none is coded first, to be judged.
+Result<std::optional<Frame>> patch_as_planned(const TrackedWork& work, const NodeRegistration& registered,
+                                              const FrameSteps& steps, FrameReason reason, VainAttempts& in_vain) {
+    auto tracked = code_for_patches(work, registered, steps, {});
     if (!tracked) return tl::unexpected(tracked.error());
-    auto patched = patch(work, registered, steps, *tracked, FrameReason::border);
+    auto patched = patch(work, registered, steps, *tracked, reason, Replaced::regions);
     if (!patched) return tl::unexpected(patched.error());
     if (!*patched) {
-        in_vain.growth = work.sequence.next_frame;
+        if (reason == FrameReason::border) in_vain.growth = work.sequence.next_frame;
         return std::optional<Frame>();
     }
     (*patched)->in_vain = in_vain;
@@ -292,9 +293,9 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     const bool due = intra_is_due(work);
     const auto& history = work.sequence.history;
     auto in_vain = history.in_vain;
-    const auto send = [&](CodedMotion coded, LatticeUnits best, bool to_grow = false) {
+    const auto send = [&](CodedMotion coded, LatticeUnits best, std::optional<FrameReason> to_patch = {}) {
         auto out = chosen_motion(work, *tracking.registered, std::move(coded), best);
-        out.history.to_grow = to_grow;
+        out.history.to_patch = to_patch;
         out.history.in_vain = in_vain;
         return Frame(std::move(out));
     };
@@ -305,17 +306,17 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         if (!why_apart(work, fit_of(work, bare->encoded))) return send(std::move(*bare), history.best_fit);
     }
 
-    // 2. Where the frame before showed surface that is not tracked: a patch that adds it.
+    // 2. The patch that the frame before has asked for.
     const bool patches = may_be_patched(work, due);
-    if (history.to_grow && patches && !work.effort.motion_alone) {
-        auto grown = grow(work, *tracking.registered, steps, {}, in_vain);
-        if (!grown) return tl::unexpected(grown.error());
-        if (*grown) return std::move(**grown);
+    if (history.to_patch && patches && !work.effort.motion_alone) {
+        auto patched = patch_as_planned(work, *tracking.registered, steps, *history.to_patch, in_vain);
+        if (!patched) return tl::unexpected(patched.error());
+        if (*patched) return std::move(**patched);
     }
 
     // 3. A T-frame, and how well it fits. Behind an I-frame it is not known yet how well its T-frames can fit; where
     // all are motion alone, it never is.
-    if (work.effort.always_other_starts) follow_limbs_anyway(work, tracking);
+    if (work.effort.always_other_starts) find_limbs(work, tracking);
     auto motion = code_and_judge(work, *tracking.registered, steps);
     if (!motion) return tl::unexpected(motion.error());
     const auto apart = motion->lost || work.effort.motion_alone ? why_apart(work, motion->fit) : std::nullopt;
@@ -324,24 +325,28 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     if (motion->lost && !due && !apart && may_repair && !may_repair())
         return send(std::move(motion->coded), history.best_fit);
 
-    // 4. Where tracking is lost: limbs from another start. Where surface comes and goes, what is far off is not shown,
-    // so that if there are none a patch may be left to the next frame: this one has taken its time.
+    // 4. Where tracking is lost: limbs from another start. Where surface comes and goes, what is far off is not shown:
+    // so the frame is sent as it is, and the next one goes on from limbs that were found, or is a patch. Each takes its
+    // time, and together they would take that of four frames.
     if (motion->lost) {
         tracking.lost = true;
-        const bool looks = !just_in_vain(work, in_vain.limbs);
-        if (!apart && !looks) tracking.searched_limbs = true;
-        if (auto ok = look_for_limbs(work, tracking, steps, patches, *motion); !ok) return tl::unexpected(ok.error());
-        if (work.configuration.tells_presence() && motion->lost && looks) {
-            in_vain.limbs = work.sequence.next_frame;
-            if (!due && !apart) return send(std::move(motion->coded), history.best_fit);
+        const bool looks = apart || !just_in_vain(work, in_vain.limbs);
+        if (work.configuration.tells_presence() && !due && !apart && !history.to_patch) {
+            const bool found = looks && find_limbs(work, tracking);
+            if (looks && !found) in_vain.limbs = work.sequence.next_frame;
+            return send(std::move(motion->coded), history.best_fit,
+                        found ? std::nullopt : std::optional(why_patched(*motion->lost)));
         }
+        if (!looks) tracking.searched_limbs = true;
+        if (auto ok = look_for_limbs(work, tracking, steps, patches, *motion); !ok) return tl::unexpected(ok.error());
     }
 
-    // 5. Where it still is, or where much was captured that is not tracked: a patch.
+    // 5. Where it still is: a patch.
     const auto& tracked = motion->coded.encoded;
     const auto anew = why_anew(work, motion->coded);
     if (!anew && patches && motion->lost) {
-        auto patched = patch(work, *tracking.registered, steps, motion->to_patch(), why_patched(*motion->lost));
+        auto patched =
+            patch(work, *tracking.registered, steps, motion->to_patch(), why_patched(*motion->lost), Replaced::all);
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) {
             (*patched)->in_vain = in_vain;
@@ -349,18 +354,14 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         }
     }
 
-    const auto growth = motion->lost ? Growth::none : growth_due(work, motion->fit, in_vain);
-    if (!anew && patches && growth == Growth::now) {
-        auto grown = grow(work, *tracking.registered, steps, tracked.near, in_vain);
-        if (!grown) return tl::unexpected(grown.error());
-        if (*grown) return std::move(**grown);
-    }
-
     // 6. The T-frame, or an I-frame: of the tracked mesh, where that is as good.
     const bool best = !motion->lost && (history.best_fit.value == 0 || motion->fit.rms < history.best_fit);
     const auto best_fit = best ? motion->fit.rms : history.best_fit;
     const auto reason = why_intra(work, due, motion->lost, anew);
-    if (!reason) return send(std::move(motion->coded), best_fit, growth == Growth::next);
+    if (!reason) {
+        const bool grows = growth_is_due(work, motion->fit, in_vain);
+        return send(std::move(motion->coded), best_fit, grows ? std::optional(FrameReason::border) : std::nullopt);
+    }
     const bool renewed = !anew && !motion->lost && may_be_renewed(work, steps, tracked.mesh);
     auto intra = renewed ? code_renewal(work, steps, tracked, *reason) : code_intra(work, steps, *reason);
     if (intra && !motion->lost) intra->best_fit = best_fit;

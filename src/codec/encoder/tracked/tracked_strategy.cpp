@@ -8,8 +8,33 @@
 
 namespace htvm::internal {
 
-TrackedWork begin_work(const Configuration& configuration, const TrackedStrategy& strategy,
-                       TrackedStrategy::Waiting frame, Tracking& tracking, std::vector<StageTime>& stages) {
+namespace {
+
+DeformableMesh deformable_of(const Configuration& configuration, const TrackedReference& reference) {
+    return make_tracked_deformable(*reference.decoded.by_nodes, reference.decoded.detail,
+                                   deformation_options(configuration), reference.origin.colours);
+}
+
+// Where there cannot be nodes, nothing can refer to the reference, so that an I-frame follows.
+void derive_what_is_left(const Configuration& configuration, TrackedSequence& sequence,
+                         std::vector<StageTime>& stages) {
+    if (!sequence.to_derive) return;
+    StageClock clock(stages);
+    auto& [reference, before, before_last, last] = *sequence.to_derive;
+    if (derive_nodes(reference->decoded, configuration.header, configuration.threads)) {
+        reference->deformable = deformable_of(configuration, *reference);
+        if (!before_last.empty())
+            sequence.history.gone_on = moved_on(before->deformable, before_last, last, reference->deformable.handles);
+    }
+    sequence.to_derive.reset();
+    clock.done("reference");
+}
+
+}  // namespace
+
+TrackedWork begin_work(const Configuration& configuration, TrackedStrategy& strategy, TrackedStrategy::Waiting frame,
+                       Tracking& tracking, std::vector<StageTime>& stages) {
+    derive_what_is_left(configuration, strategy.sequence, stages);
     auto& [captured, ahead] = frame;
     if (!ahead.surface) ahead.surface = surface_of(configuration, captured, stages);
     tracking.registered = std::move(ahead.registered);
@@ -76,27 +101,27 @@ void keep_what_holds(const Tracking& tracking, const TrackedWork::Frame* chosen,
 
 namespace {
 
-// The reference that this frame becomes. step: Reference::step. kept: what it takes over of the one before.
+// The reference that this frame becomes. step: Reference::step. kept: what it takes over of the one before. nodes:
+// whether what depends on them is derived too, where frames will refer to it.
 Result<std::shared_ptr<TrackedReference>> reference_of(const TrackedWork& work, const CodedFrame& frame,
                                                        ReferenceOrigin origin, CodedPose pose, std::int32_t step,
-                                                       KeptNodes kept) {
+                                                       KeptNodes kept, bool nodes) {
     const auto& configuration = work.configuration;
     // Under rate control a stand-in for a frame that does not fit also refers to the I-frame. A tracked skeleton gives
     // a start for the motion of the nodes.
     const bool referred_to = !configuration.intra_only() || configuration.options.rate.bits_per_second > 0;
-    auto decoded = make_reference(configuration.header,
-                                  {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured,
-                                   frame.presence, frame.detail, frame.projection},
-                                  frame.decoded, std::move(pose),
-                                  {.bones = referred_to && configuration.header.has_skeleton, .nodes = referred_to},
-                                  configuration.threads);
+    auto decoded =
+        make_reference(configuration.header,
+                       {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured, frame.presence,
+                        frame.detail, frame.projection},
+                       frame.decoded, std::move(pose),
+                       {.bones = referred_to && configuration.header.has_skeleton, .nodes = referred_to && nodes},
+                       configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     auto out = std::make_shared<TrackedReference>();
     out->decoded = std::move(*decoded);
     out->origin = std::move(origin);
-    if (out->decoded.by_nodes)
-        out->deformable = make_tracked_deformable(*out->decoded.by_nodes, frame.detail,
-                                                  deformation_options(configuration), out->origin.colours);
+    if (out->decoded.by_nodes) out->deformable = deformable_of(configuration, *out);
     return out;
 }
 
@@ -105,15 +130,19 @@ std::shared_ptr<const CapturedVertices> vertices_of(const CapturedFrame& capture
 }
 
 Result<TrackedSequence> after(const TrackedWork& work, TrackedMotion& motion) {
-    return TrackedSequence{work.sequence.next_frame + 1, work.sequence.reference, std::move(motion.history),
-                           vertices_of(work.captured)};
+    return TrackedSequence{work.sequence.next_frame + 1,
+                           work.sequence.reference,
+                           std::move(motion.history),
+                           vertices_of(work.captured),
+                           {}};
 }
 
 Result<TrackedSequence> after(const TrackedWork& work, TrackedIntra& intra) {
     const auto& before = work.sequence;
     if (!intra.frame.referred)
-        return TrackedSequence{before.next_frame + 1, before.reference, before.history, before.captured};
-    auto reference = reference_of(work, intra.frame, std::move(intra.origin), std::move(intra.pose), intra.step, {});
+        return TrackedSequence{before.next_frame + 1, before.reference, before.history, before.captured, {}};
+    auto reference =
+        reference_of(work, intra.frame, std::move(intra.origin), std::move(intra.pose), intra.step, {}, true);
     if (!reference) return tl::unexpected(reference.error());
     auto& in_use = **reference;
     in_use.intra_frame = before.next_frame;
@@ -130,8 +159,8 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedIntra& intra) {
 
 Result<TrackedSequence> after(const TrackedWork& work, TrackedPatch& patch) {
     const auto& before = *work.reference;
-    auto reference =
-        reference_of(work, patch.frame, std::move(patch.origin), std::move(patch.pose), 1, std::move(patch.kept));
+    auto reference = reference_of(work, patch.frame, std::move(patch.origin), std::move(patch.pose), 1,
+                                  std::move(patch.kept), false);
     if (!reference) return tl::unexpected(reference.error());
     auto& in_use = **reference;
     in_use.intra_frame = before.intra_frame;
@@ -145,8 +174,7 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedPatch& patch) {
     out.history.presence = std::move(patch.presence);
     out.history.in_vain = patch.in_vain;
     out.captured = vertices_of(work.captured);
-    if (!patch.before_last.empty())
-        out.history.gone_on = moved_on(before.deformable, patch.before_last, patch.last, in_use.deformable.handles);
+    out.to_derive = {*reference, work.sequence.reference, std::move(patch.before_last), std::move(patch.last)};
     out.reference = std::move(*reference);
     return out;
 }

@@ -34,9 +34,9 @@ struct TrackedStrategy {
 };
 
 // 1. What is found of the frame before it is coded: its search structures and, where it may refer to the reference, how
-// that lies on it. What was found while it waited is not found again.
-TrackedWork begin_work(const Configuration& configuration, const TrackedStrategy& strategy,
-                       TrackedStrategy::Waiting frame, Tracking& tracking, std::vector<StageTime>& stages);
+// that lies on it. What was found while it waited is not found again. Derives what a TP-frame left to derive.
+TrackedWork begin_work(const Configuration& configuration, TrackedStrategy& strategy, TrackedStrategy::Waiting frame,
+                       Tracking& tracking, std::vector<StageTime>& stages);
 
 // Beside 2., the choice. What is taken for granted of the frame that is coded: that its nodes move so, unless that is
 // not known before it is coded.

@@ -56,10 +56,10 @@ struct MotionHistory {
     TargetHistory targets;                       // what filtering left of the last one
     PresenceHistory presence;                    // what judging left of it, in streams that tell what is there
     Presence present_before_last;                // what was there one frame before; none: as of the reference
-    std::vector<RigidMotion> gone_on;  // behind a TP-frame: a start for each node of the new reference, from how the
-                                       // surface there moved on the old one; else empty
-    LatticeUnits best_fit;             // RMS of the best so far; 0: none yet
-    bool to_grow = false;  // whether so much was captured beside what is tracked that the next frame should add it
+    std::vector<RigidMotion> gone_on;     // behind a TP-frame: a start for each node of the new reference, from how the
+                                          // surface there moved on the old one; else empty
+    LatticeUnits best_fit;                // RMS of the best so far; 0: none yet
+    std::optional<FrameReason> to_patch;  // why the next frame should be a TP-frame at once; nothing if it need not
     VainAttempts in_vain;
 };
 
@@ -69,12 +69,21 @@ struct CapturedVertices {
     std::vector<Triangle> triangles;
 };
 
+// Behind a TP-frame: what is still to be derived of the reference that it became. That is a fifth of a T-frame's time,
+// and TP-frames take long enough.
+struct ToDerive {
+    std::shared_ptr<TrackedReference> reference;  // the sequence's; without nodes, and nothing to deform
+    std::shared_ptr<const TrackedReference> before;
+    std::vector<RigidMotion> before_last, last;  // of each node of the reference before, up to the TP-frame
+};
+
 // The strategy's state between two frames.
 struct TrackedSequence {
     std::uint32_t next_frame = 0;
     std::shared_ptr<const TrackedReference> reference;  // null before the first I-frame
     MotionHistory history;
     std::shared_ptr<const CapturedVertices> captured;  // of the frame that the history ends with; null if there is none
+    std::optional<ToDerive> to_derive;
 };
 
 // What was found of a frame that waits, while others were coded.
