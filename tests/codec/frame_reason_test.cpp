@@ -186,7 +186,6 @@ TEST(FrameReasons, TellOfWhatIsLostWhereSurfaceComesAndGoesWhenTheNextFrameRepai
     }
     const auto coded = encode(open, patched_options());
     EXPECT_EQ(coded.infos[4].type, FrameType::tracked);
-    EXPECT_EQ(coded.infos[5].type, FrameType::patched);
     EXPECT_EQ(reasons_of(coded), (std::vector{none, none, none, none, none, surface, none}));
 }
 

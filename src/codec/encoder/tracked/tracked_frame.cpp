@@ -218,7 +218,7 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
     const auto reached =
         reached_for_extremities(deformable, surface, registered.motion, starts.last, {.scale = options.scale});
     if (reached.empty()) return false;
-    auto near = options;  // the body is where it should be already
+    auto near = roughly;  // the body is where it should be already
     near.coarse_rounds = 0;
     const auto other = register_deformation(deformable, surface, reached, near);
     return follow_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form);
