@@ -97,7 +97,7 @@ add_test(NAME c_interface_check COMMAND ${PROJECT_SOURCE_DIR}/tests/abi/check.py
 # Builds programs against an installation of this build.
 if(HTVM_INSTALL AND htvm_kinds STREQUAL "static;shared")
   add_test(NAME install COMMAND ${PROJECT_SOURCE_DIR}/tests/install/check.sh ${PROJECT_BINARY_DIR})
-  set_tests_properties(install PROPERTIES TIMEOUT 600)
+  set_tests_properties(install PROPERTIES TIMEOUT 600 COST 95)
 endif()
 if(TARGET htvm_python)
   add_test(NAME python COMMAND ${PROJECT_SOURCE_DIR}/python/tests/run.sh $<TARGET_FILE:htvm_python> $<TARGET_FILE:htvm>)

@@ -76,6 +76,12 @@ void add_link(CLI::App& app, Run& run) {
         ->transform(
             CLI::AsNumberWithUnit(std::map<std::string, std::uint64_t>{{"s", 1}, {"m", 60}, {"h", 3600}, {"d", 86400}},
                                   CLI::AsNumberWithUnit::UNIT_REQUIRED))
+        // Before the other, which takes a negative time for a very long one.
+        ->transform(CLI::Validator(
+            [](const std::string& text) {
+                return text.starts_with('-') ? "a link cannot be good for less than no time" : std::string();
+            },
+            ""))
         ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{3660} * 86400))
         ->required();
     command

@@ -135,6 +135,7 @@ expect 1 "a stream's name has 1 to 64" timeout 5 "$htvm" serve --port 0 --publis
 grep -q "has key 1 now" said || fail "says nothing of the key: $(cat said)"
 expect 2 "--for" "$htvm" link anna --keys keys.json
 expect 2 "--for" "$htvm" link anna --keys keys.json --for 2
+expect 2 "less than no time" "$htvm" link anna --keys keys.json --for -2h
 expect 1 "no name of a live stream" "$htvm" link a/b --keys keys.json --for 2h
 expect 0 "https://hub.example/play/anna?expires=" "$htvm" link anna --keys keys.json --for 2h --url https://hub.example/
 expect 0 "wss://hub.example/watch/anna?expires=" "$htvm" link anna --keys keys.json --for 2h --url https://hub.example --packets

@@ -97,6 +97,13 @@ TEST_F(HttpServerTest, NothingOutsideTheFolderIsReached) {
     }
 }
 
+TEST_F(HttpServerTest, APathThatIsNoneIsAnsweredWithItsRule) {
+    start();
+    const auto answer = get("/publish/.anna");
+    EXPECT_EQ(status(answer), 400);
+    EXPECT_NE(answer.find("begins with '.'"), std::string::npos) << answer;
+}
+
 TEST_F(HttpServerTest, ARequestNamesOneHost) {
     start();
     const auto answer = [&](const std::string& headers) {

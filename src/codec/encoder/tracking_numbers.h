@@ -24,7 +24,7 @@ struct TrackingNumbers {
                                          // one place vary, and finer steps code that noise
     // Where simplification keeps more of the captured vertices than that, levels are not tried: what is left to say is
     // the capture's own triangles (docs/experiments/hierarchy.md).
-    double levels_most_kept = 0.72;
+    double levels_most_kept = 0.62;
     // The same where there are charts: on triangles much coarser than the capture's, pictures take more bits than is
     // saved.
     double levels_most_kept_with_charts = 0.28;

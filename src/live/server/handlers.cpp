@@ -238,7 +238,9 @@ net::awaitable<Response> answer(const Site& site, const Route& route, const Requ
             header.set(http::field::allow, "GET, HEAD");
             co_return empty_response(http::status::method_not_allowed, std::move(header));
         case Handler::bad_path:
-            co_return empty_response(http::status::bad_request, std::move(header));
+            co_return refusing_response(
+                {"path", "a path here has no part that is empty or begins with '.'", http::status::bad_request},
+                std::move(header));
         case Handler::page:
             co_return answer_page(site, "index.html", request, std::move(header));
         case Handler::player_file:
