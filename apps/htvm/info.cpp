@@ -82,7 +82,12 @@ private:
     std::optional<Packet> intra_;  // the last that may be referred to, as long as nothing needed it
 };
 
-// start: whether the index names it as a place to start; that of I- and TP-frames goes without saying.
+// Whether a place to start is marked; that of I- and TP-frames goes without saying.
+bool is_marked(const FrameInfo& f, bool start) {
+    return start && f.type != FrameType::intra && f.type != FrameType::patched;
+}
+
+// start: whether the index names it as a place to start.
 void print_frame(const FrameInfo& f, bool start) {
     auto bpv = [&](std::size_t bytes) { return bits_per_vertex(bytes, f.source_vertices); };
     const auto& b = f.bytes;
@@ -91,7 +96,7 @@ void print_frame(const FrameInfo& f, bool start) {
         "{:>14.3f} {:>22.3f} {:>8.3f}{}\n",
         f.frame,
         std::string(kind_of(f.type).letter) + (f.group > 1 ? fmt::format("{}/{}", f.place, f.group) : "") +
-            (start && f.type != FrameType::intra && f.type != FrameType::patched ? "*" : ""),
+            (is_marked(f, start) ? "*" : ""),
         f.reference, static_cast<double>(f.timestamp_us) / 1e6, f.vertices, f.triangles, b.total(),
         bpv(b[Layer::pose] + b[Layer::transforms]), bpv(b[Layer::geometry] + b[Layer::external_intra]),
         bpv(b[Layer::colour]), bpv(b[Layer::normals] + b[Layer::texcoords]), bpv(b[Layer::mapping]),
@@ -351,6 +356,7 @@ struct Findings {
     std::size_t frames = 0;
     std::uint64_t bytes = 0;
     bool has_index = false, has_groups = false;
+    bool marks_starts = false;  // of a T-frame
     std::optional<StreamIndex> front;
     AudioTotals audio;
     StreamPictures pictures;
@@ -452,7 +458,9 @@ Result<void> take_frame(Inspection& in, const Packet& packet) {
         found.frame_list.back()["recoded_share"] = recoded ? nlohmann::json(*recoded) : nlohmann::json();
         if (!levels.empty()) found.frame_list.back()["levels"] = levels_json(levels);
     }
-    if (in.lists_frames()) print_frame(frame, found.front && is_start(*found.front, frame.frame));
+    const bool start = found.front && is_start(*found.front, frame.frame);
+    found.marks_starts = found.marks_starts || is_marked(frame, start);
+    if (in.lists_frames()) print_frame(frame, start);
     return {};
 }
 
@@ -515,9 +523,9 @@ void print_totals(const Inspection& in) {
     if (!in.options.summary)
         fmt::print(
             "bpv: bits per captured vertex, as from pose/transforms on; vertices and triangles: of the decoded "
-            "mesh{}\n"
-            "*: a place to start, as every I- and TP-frame is\n{}\n",
+            "mesh{}\n{}{}\n",
             found.leveled_frames > 0 ? ", of an I-frame with levels without its detail" : "",
+            found.marks_starts ? "*: a place to start, as every I- and TP-frame is\n" : "",
             found.has_groups
                 ? "T1/8: the first of a group of eight T-frames; its packet, and others, bring frames that follow\n"
                 : "");
