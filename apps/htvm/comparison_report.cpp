@@ -1,7 +1,9 @@
 #include "comparison_report.h"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "command_line/terminal.h"
@@ -42,6 +44,40 @@ WorstRegions regions_of(const Measured& measured) {
     WorstRegions out{{}, measured.kinds};
     for (const auto& frame : measured.frames) out.worst_mm.push_back(frame.region.worst_mm);
     return out;
+}
+
+// The frames that one would look at first: the three with most of what is measured of each, the worst one first.
+template <class Measure>
+std::vector<std::size_t> farthest_off(const Measured& measured, Measure of) {
+    constexpr std::size_t most = 3;
+    std::vector<std::size_t> order;
+    for (std::size_t i = 0; i < measured.frames.size(); ++i)
+        if (of(measured.frames[i]) > 0) order.push_back(i);
+    const auto count = std::min(most, order.size());
+    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
+                      [&](std::size_t a, std::size_t b) { return of(measured.frames[a]) > of(measured.frames[b]); });
+    std::vector<std::size_t> out;
+    for (std::size_t k = 0; k < count; ++k) out.push_back(measured.places[order[k]]);
+    return out;
+}
+
+struct FarthestFrames {
+    std::vector<std::size_t> by_m2, by_region;  // numbers
+};
+FarthestFrames farthest_frames(const CompareOptions& options, const Measured& measured) {
+    FarthestFrames out;
+    if (options.surface) out.by_m2 = farthest_off(measured, [](const auto& frame) { return m2(frame.surface); });
+    if (options.regions)
+        out.by_region = farthest_off(measured, [](const auto& frame) { return frame.region.worst_mm; });
+    return out;
+}
+
+std::string farthest_rows(const FarthestFrames& frames) {
+    std::string out;
+    if (frames.by_m2.size() > 1) out += fmt::format("  by M2: {}\n", fmt::join(frames.by_m2, ", "));
+    if (frames.by_region.size() > 1)
+        out += fmt::format("  by the worst region: {}\n", fmt::join(frames.by_region, ", "));
+    return out.empty() ? out : "\n  frames that are farthest off; --csv FILE lists all\n" + out;
 }
 
 nlohmann::json drift_json(const FrameDrift& drift) {
@@ -104,6 +140,9 @@ nlohmann::json as_json(const ComparisonRequest& options, const Measured& measure
         for (const FrameDrift& of_age : measured.drift.by_age()) drift["by_age"].push_back(drift_json(of_age));
     }
     if (has_flicker(measured.flickers)) out["sequence"]["flicker"] = flicker_json(measured.flickers);
+    const auto farthest = farthest_frames(options.compare, measured);
+    if (!farthest.by_m2.empty()) out["sequence"]["m2"]["farthest_frames"] = farthest.by_m2;
+    if (!farthest.by_region.empty()) out["sequence"]["worst_region"]["farthest_frames"] = farthest.by_region;
     return out;
 }
 
@@ -114,6 +153,7 @@ std::string as_table(const ComparisonRequest& options, const Measured& measured)
         out += coverage_rows(summarise(measured.sums, options.peak_mm), options.compare, measured.coverage);
     if (!measured.drifts.empty()) out += drift_rows(measured.drift);
     if (has_flicker(measured.flickers)) out += flicker_rows(measured.flickers, options.compare.render.shading);
+    out += farthest_rows(farthest_frames(options.compare, measured));
     return out;
 }
 

@@ -229,6 +229,10 @@ expect 0 "frame 42 of walk left out: gap has no such" "$htvm" compare walk gap -
 "$htvm" compare walk walk_whole --only m1 --csv - 2>/dev/null | grep -v '^2,' >whole.csv
 "$htvm" compare walk gap --only m1 --csv - 2>/dev/null >gap.csv
 cmp -s whole.csv gap.csv || { echo "FAILED: a missing file changes what others are compared with"; failures=$((failures + 1)); }
+# The frames to look at first are named: one of them has another's mesh here.
+rm -rf off && cp -r walk off && cp "$(ls off/*.ply | sed -n 1p)" "$(ls off/*.ply | sed -n 3p)"
+expect 0 "by M2: 2" "$htvm" compare walk off --only m2
+expect 0 "by the worst region: 2" "$htvm" compare walk off --only regions
 
 # Help: the everyday options first, all on demand; the exit codes.
 expect 0 "--skeleton" "$htvm" encode --help
