@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <map>
 #include <utility>
 
+#include "codec/encoder/tracked/mesh_borders.h"
+#include "codec/encoder/tracked/patch_join.h"
 #include "core/disjoint_sets.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
@@ -19,8 +20,7 @@
 //  2. What stays (Remainder) is made tidy, so that its open border is a set of plain chains.
 //  3. The piece (cut_piece) is what of the captured surface lies outside of that border, by half an edge at least. The
 //     gap gives the strip between the two borders triangles of a good shape, and keeps the borders from crossing.
-//  4. The borders are joined (join). Each side of the piece's border looks for the side of the open border that it runs
-//     along; runs of sides that found the same chain are joined to it by a strip of triangles.
+//  4. The borders are joined (patch_join.h): runs of sides that found the same chain, by a strip of triangles.
 // Where step 4 finds no clear partner, more goes around that place and steps 2 to 4 are repeated: farther from what was
 // lost the surfaces lie closer together, and the borders are longer and rounder.
 
@@ -28,110 +28,6 @@ namespace htvm::internal {
 namespace {
 
 constexpr std::uint32_t none = SurfacePoint::nothing;
-
-// ---- Sides and borders ----------------------------------------------------------------------------------------------
-
-double area_of(std::span<const LatticePoint> positions, const Triangle& t) {
-    return length(area_vector(positions, t)) / 2;
-}
-Vector3d normal_of(std::span<const LatticePoint> positions, const Triangle& t) {
-    return normalised(area_vector(positions, t));
-}
-
-// The sides of a mesh's triangles, each in the direction in which its triangle names its ends, and which lie against
-// each other. Where more than two triangles meet in an edge, as where two surfaces touch, those that continue each
-// other best belong together: borders then never end there.
-class Sides {
-public:
-    Sides(std::span<const LatticePoint> positions, std::span<const Triangle> triangles)
-        : triangles_(triangles), twin_(3 * triangles.size(), none) {
-        // The sides that leave each vertex, ascending, in compressed rows, with where they lead.
-        struct Leaving {
-            std::uint32_t side = 0, to = 0;
-        };
-        std::vector<std::uint32_t> first(positions.size() + 1, 0);
-        std::vector<Leaving> leaving(twin_.size());
-        for (const auto& t : triangles)
-            for (const auto v : t) ++first[v + std::size_t{1}];
-        for (std::size_t v = 0; v < positions.size(); ++v) first[v + 1] += first[v];
-        std::vector<std::uint32_t> next_free(first.begin(), first.end() - 1);
-        for (std::uint32_t t = 0, s = 0; t < triangles.size(); ++t)
-            for (std::size_t i = 0; i < 3; ++i, ++s)
-                leaving[next_free[triangles[t][i]]++] = {s, triangles[t][(i + 1) % 3]};
-        const auto row = [&](std::uint32_t v) {
-            return std::span(leaving).subspan(first[v], first[v + std::size_t{1}] - first[v]);
-        };
-        const auto find = [&](std::uint32_t a, std::uint32_t b, std::vector<std::uint32_t>& found) {
-            found.clear();
-            for (const auto& side : row(a))
-                if (side.to == b) found.push_back(side.side);
-        };
-        // The side from a to b, if there is one alone.
-        const auto only = [&](std::uint32_t a, std::uint32_t b) {
-            std::uint32_t found = none, count = 0;
-            for (const auto& side : row(a))
-                if (side.to == b) found = side.side, ++count;
-            return count == 1 ? found : none;
-        };
-        const auto agreement = [&](std::uint32_t a, std::uint32_t b) {
-            return dot(normal_of(positions, triangles[a / 3]), normal_of(positions, triangles[b / 3]));
-        };
-        std::vector<std::uint32_t> along, against;
-        for (std::uint32_t s = 0; s < twin_.size(); ++s) {
-            if (from(s) == to(s)) twin_[s] = s;  // of a triangle that names a vertex twice: never a border
-            if (twin_[s] != none) continue;
-            const auto other = only(to(s), from(s));
-            if (other != none && only(from(s), to(s)) == s) {
-                twin_[s] = other, twin_[other] = s;
-                continue;
-            }
-            find(from(s), to(s), along);
-            find(to(s), from(s), against);
-            for (std::size_t pairs = std::min(along.size(), against.size()); pairs > 0; --pairs) {
-                double best = -2;
-                std::size_t a = 0, b = 0;
-                for (std::size_t i = 0; i < along.size(); ++i)
-                    for (std::size_t j = 0; j < against.size(); ++j)
-                        if (const double agrees = agreement(along[i], against[j]); agrees > best)
-                            best = agrees, a = i, b = j;
-                twin_[along[a]] = against[b], twin_[against[b]] = along[a];
-                along.erase(along.begin() + static_cast<std::ptrdiff_t>(a));
-                against.erase(against.begin() + static_cast<std::ptrdiff_t>(b));
-            }
-        }
-    }
-    std::uint32_t count() const { return static_cast<std::uint32_t>(twin_.size()); }
-    std::uint32_t from(std::uint32_t side) const { return triangles_[side / 3][side % 3]; }
-    std::uint32_t to(std::uint32_t side) const { return triangles_[side / 3][(side + 1) % 3]; }
-    // The side of the triangle on the other side of the edge; `none` on a border.
-    std::uint32_t twin(std::uint32_t side) const { return twin_[side]; }
-    // The next side of the same triangle.
-    static std::uint32_t next(std::uint32_t side) { return side - side % 3 + (side + 1) % 3; }
-
-private:
-    std::span<const Triangle> triangles_;
-    std::vector<std::uint32_t> twin_;
-};
-
-// The borders of the part of a mesh whose triangles stay: cycles of sides that have this part to their left. They are
-// followed by turning around each vertex, so that borders that touch in one are told apart.
-template <class Stays>
-std::vector<std::vector<std::uint32_t>> border_loops(const Sides& sides, const Stays& stays) {
-    const auto on_border = [&](std::uint32_t s) { return sides.twin(s) == none || !stays(sides.twin(s) / 3); };
-    std::vector<bool> seen(sides.count(), false);
-    std::vector<std::vector<std::uint32_t>> out;
-    for (std::uint32_t first = 0; first < sides.count(); ++first) {
-        if (seen[first] || !stays(first / 3) || !on_border(first)) continue;
-        auto& loop = out.emplace_back();
-        for (std::uint32_t s = first; !seen[s];) {
-            seen[s] = true;
-            loop.push_back(s);
-            s = Sides::next(s);
-            while (!on_border(s)) s = Sides::next(sides.twin(s));
-        }
-    }
-    return out;
-}
 
 // ---- Closest points -------------------------------------------------------------------------------------------------
 
@@ -216,8 +112,7 @@ struct Capture {
         return found.found() && static_cast<double>(found.squared_distance) <= near.value * near.value;
     }
 
-    std::optional<NearestPoints> along_rim{};  // points of the border, half a side apart
-    LatticeUnits rim_reach{};                  // what is nearer than this to one of them is at the border
+    CaptureRim border{};
 
     // Whether the capture's point nearest to this one lies on its border.
     bool ends_at(const Point3f& point) const {
@@ -227,11 +122,6 @@ struct Capture {
         for (std::size_t i = 0; i < 3; ++i)
             if (found.shares[i] > inside && !rim[mesh.triangles[found.triangle][i]]) return false;
         return *std::min_element(found.shares.begin(), found.shares.end()) <= inside;
-    }
-    // The same for points of a simplified border.
-    bool ends_near(const Point3f& point) const {
-        return along_rim &&
-               static_cast<double>(along_rim->nearest(point).squared_distance) <= rim_reach.value * rim_reach.value;
     }
 };
 
@@ -341,7 +231,7 @@ std::vector<bool> distorted(const TrackedMesh& tracked, const Sides& sides, cons
     for (std::uint32_t s = 0; s < sides.count(); ++s) {
         if (side_length(decoded.positions, s) > options.stretch * std::max(side_length(rest, s), 1.0)) mark(s / 3);
         const auto twin = sides.twin(s);
-        if (twin == none || twin < s) continue;
+        if (twin == no_side || twin < s) continue;
         const auto &t = decoded.triangles[s / 3], &u = decoded.triangles[twin / 3];
         if (dot(normal_of(decoded.positions, t), normal_of(decoded.positions, u)) < folded &&
             dot(normal_of(rest, t), normal_of(rest, u)) > flat)
@@ -426,18 +316,6 @@ std::vector<bool> find_lost(const LatticeMesh& decoded, const Sides& sides, cons
 
 // ---- 2. What stays --------------------------------------------------------------------------------------------------
 
-// A part of the open border: from one vertex to the next, the surface that stays to the left.
-struct Chain {
-    std::vector<std::uint32_t> sides;  // of the decoded mesh
-    bool closed = false;
-};
-
-struct Remainder {
-    std::vector<Triangle> triangles;
-    std::vector<Chain> chains;
-    std::vector<bool> open;  // vertices on the open border
-};
-
 // Lets go of what would be left as a notch, a bridge one triangle wide, or an island, until nothing changes.
 void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& sides,
           const SurfacePatchOptions& options) {
@@ -478,7 +356,7 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
         const auto stays = [&](std::uint32_t triangle) { return stays_as_whole[triangle] != 0; };
         std::vector<std::uint32_t> borders(vertices, 0);
         for (std::uint32_t s = 0; s < sides.count(); ++s)
-            if (stays(s / 3) && (sides.twin(s) == none || !stays(sides.twin(s) / 3))) ++borders[sides.from(s)];
+            if (stays(s / 3) && (sides.twin(s) == no_side || !stays(sides.twin(s) / 3))) ++borders[sides.from(s)];
         std::vector<std::uint32_t> more;
         for (std::uint32_t v = 0; v < vertices; ++v) {
             if (removed[v] || gone[v] == 0) {
@@ -503,7 +381,7 @@ Remainder remainder_of(const LatticeMesh& decoded, const Sides& sides, const std
     for (std::uint32_t t = 0; t < decoded.triangles.size(); ++t)
         if (stays(t)) out.triangles.push_back(decoded.triangles[t]);
     out.open.assign(removed.size(), false);
-    const auto natural = [&](std::uint32_t side) { return sides.twin(side) == none; };
+    const auto natural = [&](std::uint32_t side) { return sides.twin(side) == no_side; };
     for (auto& loop : border_loops(sides, stays)) {
         const auto end = std::find_if(loop.begin(), loop.end(), natural);
         const bool closed = end == loop.end();
@@ -706,323 +584,6 @@ LatticeMesh cut_piece(const Outside& outside, const Capture& capture, const Surf
     return parts_that_join(Cutter(outside, capture.mesh, options.gap).run(), !capture.from_border.empty(), options);
 }
 
-// ---- 4. The join ----------------------------------------------------------------------------------------------------
-
-// A vertex of a border, as the strip sees it. The piece's vertices are numbered behind the decoded mesh's.
-struct StripVertex {
-    std::uint32_t number = 0;
-    Vector3d position{}, normal{};
-};
-
-// The triangles between two paths that run the same way, the mesh that stays to the left of `left`, the piece to the
-// right of `right`. Of all strips, the one with the shortest crossings whose triangles face as the borders do: found
-// row by row, since going by the shorter diagonal alone falls behind where one border is longer. Nothing if the paths
-// are too long for that or do not face each other.
-std::optional<std::vector<Triangle>> strip_between(const std::vector<StripVertex>& left,
-                                                   const std::vector<StripVertex>& right) {
-    constexpr std::size_t most = std::size_t{1} << 21;
-    constexpr double turned = 8;  // what a triangle that faces the other way costs, against one that faces right
-    const std::size_t n = left.size(), m = right.size();
-    if (n == 0 || m == 0 || n + m < 3 || n * m > most) return std::nullopt;
-    constexpr double infinite = std::numeric_limits<double>::infinity();
-    std::vector<double> cost(n * m, infinite);
-    std::vector<bool> along_left(n * m, false);
-    const auto price = [&](const StripVertex& a, const StripVertex& b, const StripVertex& c, double crossing) {
-        const auto across = area_vector(a.position, b.position, c.position);
-        const double size = length(across);
-        const auto facing = normalised(a.normal + b.normal + c.normal);
-        const double agreement = size > 0 ? dot(across, facing) / size : -1;
-        return crossing * (1 + turned * (1 - agreement) / 2) + (size > 0 ? 0 : 1e12);
-    };
-    cost[0] = 0;
-    for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t j = 0; j < m; ++j) {
-            const auto apart = left[i].position - right[j].position;
-            const double crossing = dot(apart, apart);
-            auto& best = cost[i * m + j];
-            if (i > 0) {
-                const double by_left = cost[(i - 1) * m + j] + price(left[i], left[i - 1], right[j], crossing);
-                if (by_left < best) best = by_left, along_left[i * m + j] = true;
-            }
-            if (j > 0) {
-                const double by_right = cost[i * m + j - 1] + price(right[j - 1], right[j], left[i], crossing);
-                if (by_right < best) best = by_right, along_left[i * m + j] = false;
-            }
-        }
-    std::vector<Triangle> out;
-    for (std::size_t i = n - 1, j = m - 1; i > 0 || j > 0;) {
-        if (along_left[i * m + j]) {
-            out.push_back({left[i].number, left[i - 1].number, right[j].number});
-            --i;
-        } else {
-            out.push_back({right[j - 1].number, right[j].number, left[i].number});
-            --j;
-        }
-    }
-    std::reverse(out.begin(), out.end());
-    return out;
-}
-
-// The nearest point of the side ab to p, squared.
-double squared_distance_to_side(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
-    const auto along = b - a, from = p - a;
-    const double size = dot(along, along);
-    const auto off = from - along * (size > 0 ? std::clamp(dot(from, along) / size, 0.0, 1.0) : 0.0);
-    return dot(off, off);
-}
-
-struct Join {
-    std::vector<Triangle> triangles;
-    std::vector<bool> unclear;  // vertices of the decoded mesh at which no partner was found; empty: all is joined
-};
-
-// The side of the open border that a side of the piece's border runs along.
-struct Partner {
-    std::uint32_t chain = none, side = 0;
-};
-
-class Joiner {
-public:
-    Joiner(const LatticeMesh& decoded, const Sides& sides, const Remainder& stays, const LatticeMesh& piece,
-           std::span<const double> edge, const Capture& capture, const SurfacePatchOptions& options)
-        : decoded_(decoded),
-          sides_(sides),
-          stays_(stays),
-          piece_(piece),
-          piece_sides_(piece.positions, piece.triangles),
-          edge_(edge),
-          capture_(capture),
-          options_(options),
-          normals_(vertex_normals(decoded.positions, stays.triangles)),
-          piece_normals_(vertex_normals(piece.positions, piece.triangles)),
-          unclear_(decoded.positions.size(), false) {
-        for (std::uint32_t c = 0; c < stays.chains.size(); ++c) {
-            taken_.emplace_back(stays.chains[c].sides.size(), false);
-            for (std::uint32_t s = 0; s < stays.chains[c].sides.size(); ++s) open_.push_back(open_side({c, s}));
-        }
-    }
-
-    Join run() {
-        for (const auto& loop : border_loops(piece_sides_, [](std::uint32_t) { return true; })) join_loop(loop);
-        check_what_is_left();
-        const bool clear = std::find(unclear_.begin(), unclear_.end(), true) == unclear_.end();
-        return {std::move(triangles_), clear ? std::vector<bool>{} : std::move(unclear_)};
-    }
-
-private:
-    const LatticeMesh& decoded_;
-    const Sides& sides_;
-    const Remainder& stays_;
-    const LatticeMesh& piece_;
-    Sides piece_sides_;
-    std::span<const double> edge_;
-    const Capture& capture_;
-    const SurfacePatchOptions& options_;
-    std::vector<Vector3d> normals_, piece_normals_;
-    // A side of the open border, as partners are looked for.
-    struct OpenSide {
-        Partner at;
-        Vector3d from{}, to{}, facing{};
-        Vector3d middle{};
-        double near = 0;    // how far from it the side of a piece may be that runs along it
-        double within = 0;  // how far such a side's middle may be from its own
-    };
-    std::vector<OpenSide> open_;
-    std::vector<std::vector<bool>> taken_;  // sides of the chains that are joined
-    std::vector<Triangle> triangles_;
-    std::vector<bool> unclear_;
-    std::vector<std::uint32_t> staying_;            // vertices that stay, ascending, once the nearest was looked for,
-    std::optional<NearestPoints> nearest_staying_;  // in the same order
-
-    Vector3d piece_point(std::uint32_t v) const { return to_vector(piece_.positions[v]); }
-    Vector3d middle_of(std::uint32_t side) const {
-        return (piece_point(piece_sides_.from(side)) + piece_point(piece_sides_.to(side))) * 0.5;
-    }
-
-    OpenSide open_side(const Partner& at) const {
-        constexpr double most_gaps = 3;
-        const auto side = stays_.chains[at.chain].sides[at.side];
-        const auto from = sides_.from(side), to = sides_.to(side);
-        OpenSide out{at, to_vector(decoded_.positions[from]), to_vector(decoded_.positions[to])};
-        out.facing = normals_[from] + normals_[to];
-        out.middle = (out.from + out.to) * 0.5;
-        out.near = most_gaps * options_.gap * std::max(edge_[from], edge_[to]);
-        out.within = out.near + length(out.to - out.from);
-        return out;
-    }
-
-    Partner partner_of(std::uint32_t side) const {
-        const auto middle = middle_of(side);
-        const auto along = piece_point(piece_sides_.to(side)) - piece_point(piece_sides_.from(side));
-        const auto facing = normal_of(piece_.positions, piece_.triangles[side / 3]);
-        Partner out;
-        double least = std::numeric_limits<double>::infinity();
-        for (const auto& open : open_) {
-            const auto apart = middle - open.middle;
-            if (dot(apart, apart) > open.within * open.within) continue;
-            const double squared = squared_distance_to_side(middle, open.from, open.to);
-            if (squared >= least || squared > open.near * open.near) continue;
-            if (dot(along, open.to - open.from) > 0 || dot(facing, open.facing) <= 0) continue;
-            least = squared;
-            out = open.at;
-        }
-        return out;
-    }
-
-    StripVertex staying(std::uint32_t v) const { return {v, to_vector(decoded_.positions[v]), normals_[v]}; }
-    StripVertex coming(std::uint32_t v) const {
-        return {static_cast<std::uint32_t>(decoded_.positions.size()) + v, to_vector(piece_.positions[v]),
-                piece_normals_[v]};
-    }
-
-    void give_up_staying(std::uint32_t side) { unclear_[sides_.from(side)] = unclear_[sides_.to(side)] = true; }
-    void give_up(const Chain& chain) {
-        for (const auto side : chain.sides) give_up_staying(side);
-    }
-    void give_up_coming(std::uint32_t side) {
-        if (stays_.triangles.empty()) return;
-        if (!nearest_staying_) {
-            std::vector<bool> stays(decoded_.positions.size(), false);
-            for (const auto& t : stays_.triangles)
-                for (const auto v : t) stays[v] = true;
-            std::vector<Point3f> points;
-            for (std::uint32_t v = 0; v < stays.size(); ++v) {
-                if (!stays[v]) continue;
-                staying_.push_back(v);
-                points.push_back(point_of(decoded_.positions[v]));
-            }
-            nearest_staying_.emplace(points);
-        }
-        unclear_[staying_[nearest_staying_->nearest(to_floats(middle_of(side))).index]] = true;
-    }
-
-    // A whole loop of the piece along a whole loop of the open border, from where they are nearest to each other.
-    void join_closed(std::uint32_t number, const std::vector<std::uint32_t>& loop) {
-        const auto& chain = stays_.chains[number].sides;
-        std::size_t start = 0, start_of_loop = 0;
-        double least = std::numeric_limits<double>::infinity();
-        for (std::size_t i = 0; i < chain.size(); ++i)
-            for (std::size_t j = 0; j < loop.size(); ++j) {
-                const auto apart =
-                    to_vector(decoded_.positions[sides_.from(chain[i])]) - piece_point(piece_sides_.from(loop[j]));
-                if (dot(apart, apart) < least) least = dot(apart, apart), start = i, start_of_loop = j;
-            }
-        std::vector<StripVertex> left, right;
-        for (std::size_t i = 0; i <= chain.size(); ++i)
-            left.push_back(staying(sides_.from(chain[(start + i) % chain.size()])));
-        for (std::size_t j = 0; j <= loop.size(); ++j)
-            right.push_back(coming(piece_sides_.from(loop[(start_of_loop + loop.size() - j) % loop.size()])));
-        add_strip(left, right, number);
-        taken_[number].assign(chain.size(), true);
-    }
-
-    void add_strip(const std::vector<StripVertex>& left, const std::vector<StripVertex>& right, std::uint32_t number) {
-        const auto strip = strip_between(left, right);
-        if (!strip)
-            give_up(stays_.chains[number]);
-        else
-            triangles_.insert(triangles_.end(), strip->begin(), strip->end());
-    }
-
-    void join_loop(const std::vector<std::uint32_t>& loop) {
-        constexpr double most = 0.8;
-        const std::size_t size = loop.size();
-        std::vector<Partner> partners;
-        for (const auto& side : loop) partners.push_back(partner_of(side));
-        std::map<std::uint32_t, std::size_t> votes;
-        for (const auto& p : partners) ++votes[p.chain];
-        if (votes.size() == 1 && votes.count(none) > 0) return check_loose(loop);
-        for (const auto& [chain, count] : votes) {
-            if (chain == none || !stays_.chains[chain].closed) continue;
-            if (static_cast<double>(count) < most * static_cast<double>(size)) continue;
-            if (std::find(taken_[chain].begin(), taken_[chain].end(), true) != taken_[chain].end())
-                give_up(stays_.chains[chain]);
-            else
-                join_closed(chain, loop);
-            return;
-        }
-        join_runs(loop, partners);
-    }
-
-    // Sides of the piece's border that are joined to nothing must be the capture's own border.
-    void check_loose(std::span<const std::uint32_t> sides) {
-        for (const auto side : sides)
-            if (!capture_.ends_near(to_floats(middle_of(side)))) {
-                give_up_coming(side);
-            }
-    }
-
-    // Where a border of the capture interrupts the cut, or one of the mesh the open border: each run of sides with
-    // partners in one chain is joined for itself.
-    void join_runs(const std::vector<std::uint32_t>& loop, std::vector<Partner>& partners) {
-        constexpr std::size_t bridged = 2, fewest = 2;
-        const std::size_t size = loop.size();
-        for (std::size_t i = 0; i < size; ++i) {  // single sides between two of one chain go with them
-            if (partners[i].chain == none) continue;
-            for (std::size_t gap = 1; gap <= bridged; ++gap) {
-                const auto& end = partners[(i + gap + 1) % size];
-                if (end.chain != partners[i].chain) continue;
-                for (std::size_t k = 1; k <= gap; ++k)
-                    if (partners[(i + k) % size].chain != end.chain) partners[(i + k) % size] = partners[i];
-            }
-        }
-        std::vector<std::uint32_t> loose;
-        std::size_t start = 0;
-        while (start < size && partners[start].chain == partners[(start + size - 1) % size].chain) ++start;
-        if (start == size) start = 0;
-        for (std::size_t i = 0; i < size;) {
-            const auto chain = partners[(start + i) % size].chain;
-            std::size_t end = i;
-            while (end < size && partners[(start + end) % size].chain == chain) ++end;
-            if (chain != none && end - i >= fewest)
-                join_run(loop, partners, (start + i) % size, end - i);
-            else
-                for (std::size_t k = i; k < end; ++k) loose.push_back(loop[(start + k) % size]);
-            i = end;
-        }
-        check_loose(loose);
-    }
-
-    void join_run(const std::vector<std::uint32_t>& loop, const std::vector<Partner>& partners, std::size_t first,
-                  std::size_t count) {
-        constexpr std::size_t to_the_end = 2;
-        const auto number = partners[first].chain;
-        const auto& chain = stays_.chains[number];
-        const std::size_t size = chain.sides.size();
-        // The piece's border runs the other way.
-        std::size_t from = partners[(first + count - 1) % loop.size()].side, to = partners[first].side;
-        if (!chain.closed) {
-            if (from <= to_the_end) from = 0;
-            if (to + to_the_end + 1 >= size) to = size - 1;
-            if (from > to) return give_up(chain);
-        }
-        const std::size_t sides = (to + size - from) % size + 1;
-        std::vector<StripVertex> left, right;
-        for (std::size_t i = 0; i < sides; ++i) {
-            const std::size_t s = (from + i) % size;
-            if (taken_[number][s]) give_up_staying(chain.sides[s]);
-            taken_[number][s] = true;
-            left.push_back(staying(sides_.from(chain.sides[s])));
-        }
-        left.push_back(staying(sides_.to(chain.sides[to])));
-        right.push_back(coming(piece_sides_.to(loop[(first + count - 1) % loop.size()])));
-        for (std::size_t i = count; i-- > 0;)
-            right.push_back(coming(piece_sides_.from(loop[(first + i) % loop.size()])));
-        add_strip(left, right, number);
-    }
-
-    // An open border may stay open only where the capture ends.
-    void check_what_is_left() {
-        for (std::uint32_t c = 0; c < stays_.chains.size(); ++c) {
-            const auto& sides = stays_.chains[c].sides;
-            for (std::size_t i = 0; i < sides.size(); ++i)
-                if (!taken_[c][i] && !capture_.ends_near(point_of(decoded_.positions[sides_.from(sides[i])]))) {
-                    give_up_staying(sides[i]);
-                }
-        }
-    }
-};
-
 }  // namespace
 
 struct SurfacePatchSearch::Measured {
@@ -1066,7 +627,7 @@ Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, c
     std::vector<Point3f> along_rim;
     double rim_length = 0;
     for (std::uint32_t s = 0; s < sides.count(); ++s) {
-        if (sides.twin(s) != none) continue;
+        if (sides.twin(s) != no_side) continue;
         if (inside[sides.from(s)] != 0 || inside[sides.to(s)] != 0) continue;
         if (capture.rim.empty()) capture.rim.assign(capture.points.size(), false);
         const auto a = sides.from(s), b = sides.to(s);
@@ -1077,8 +638,8 @@ Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, c
         rim_length += length(to - from);
     }
     if (along_rim.empty()) return capture;
-    capture.along_rim.emplace(along_rim);
-    capture.rim_reach =
+    capture.border.along.emplace(along_rim);
+    capture.border.reach =
         2 * options.simplification.surface_error + LatticeUnits(rim_length / static_cast<double>(along_rim.size()));
     return capture;
 }
@@ -1151,7 +712,7 @@ std::optional<SurfacePatch> SurfacePatchSearch::find(LatticeUnits region_lost) c
         const auto outside = outside_of(stays, m.decoded, removed, m.edge, *m.capture, options);
         const auto piece =
             simplified_piece(cut_piece(outside, *m.capture, options), m.captured, m.surface, options.simplification);
-        auto join = Joiner(m.decoded, *m.sides, stays, piece, m.edge, *m.capture, options).run();
+        auto join = join_piece({m.decoded, *m.sides, stays, m.edge}, piece, m.capture->border, options.gap);
         if (join.unclear.empty() || (open && attempt + 1 == options.attempts)) {
             if (piece.triangles.empty() && open) return std::nullopt;
             SurfacePatch out;
