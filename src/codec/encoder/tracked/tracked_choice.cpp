@@ -277,7 +277,8 @@ Result<std::optional<Frame>> patch_as_planned(const TrackedWork& work, const Nod
     auto patched = patch(work, registered, steps, *tracked, reason, Replaced::regions);
     if (!patched) return tl::unexpected(patched.error());
     if (!*patched) {
-        if (reason == FrameReason::border) in_vain.growth = work.sequence.next_frame;
+        auto& last = reason == FrameReason::border ? in_vain.growth : in_vain.repair;
+        last = work.sequence.next_frame;
         return std::optional<Frame>();
     }
     (*patched)->in_vain = in_vain;
@@ -308,6 +309,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
 
     // 2. The patch that the frame before has asked for.
     const bool patches = may_be_patched(work, due);
+    const bool repaired_in_vain = just_in_vain(work, in_vain.repair);
     if (history.to_patch && patches && !work.effort.motion_alone) {
         auto patched = patch_as_planned(work, *tracking.registered, steps, *history.to_patch, in_vain);
         if (!patched) return tl::unexpected(patched.error());
@@ -326,12 +328,13 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         return send(std::move(motion->coded), history.best_fit);
 
     // 4. Where tracking is lost: limbs from another start. Where surface comes and goes, what is far off is not shown:
-    // so the frame is sent as it is, and the next one goes on from limbs that were found, or is a patch. Each takes its
-    // time, and together they would take that of four frames.
+    // so the frame is sent as it is, and the next one goes on from limbs that were found, or is a patch, unless that
+    // was in vain twice. Each takes its time, and together they would take that of four frames.
     if (motion->lost) {
         tracking.lost = true;
         const bool looks = apart || !just_in_vain(work, in_vain.limbs);
-        if (work.configuration.tells_presence() && !due && !apart && !history.to_patch) {
+        const bool in_vain_again = repaired_in_vain && in_vain.repair == work.sequence.next_frame;
+        if (work.configuration.tells_presence() && !due && !apart && patches && !in_vain_again) {
             const bool found = looks && find_limbs(work, tracking);
             if (looks && !found) in_vain.limbs = work.sequence.next_frame;
             return send(std::move(motion->coded), history.best_fit,

@@ -45,6 +45,7 @@ struct TrackedReference {
 struct VainAttempts {
     std::optional<std::uint32_t> limbs;   // looking for lost ones
     std::optional<std::uint32_t> growth;  // adding what was captured beside what is tracked
+    std::optional<std::uint32_t> repair;  // patching what is lost, as the frame before had asked
 };
 
 // What the T-frames since the reference leave for the next one.
