@@ -225,7 +225,9 @@ Result<void> check_whole(const StreamInput& input, const std::string& path, cons
         return fail(
             ErrorKind::corrupt_stream,
             fmt::format("{}{}; {}", input.first_loss(),
-                        lost > 1 ? fmt::format("; {} more are left out, too", counted(lost - 1, "segment")) : "",
+                        lost > 1 ? fmt::format("; {} more {} left out, too", counted(lost - 1, "segment"),
+                                               lost > 2 ? "are" : "is")
+                                 : "",
                         advice));
     if (input.missing_bytes() > 0)
         return fail(ErrorKind::corrupt_stream, fmt::format("{} is cut short: its end, {}, is missing; {}", path,

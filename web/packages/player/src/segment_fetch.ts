@@ -21,19 +21,26 @@ export type Fetched =
     | { outcome: 'gone' }
     | { outcome: 'given up'; bitsPerSecond: number };
 
-/**
- * The file. Throws where no connection comes about, again and again, and where the signal aborts. giveUp: asked now and then
- * whether to go on.
- */
-export async function fetchFile(url: string, signal: AbortSignal, giveUp?: (progress: Progress) => boolean, fresh = false): Promise<Fetched> {
+export interface FetchOptions {
+    /** Asked now and then whether to go on. */
+    giveUp?: (progress: Progress) => boolean;
+    /** The browser's own copy is not enough. */
+    fresh?: boolean;
+    /** Whether to try again where the server fails or no connection comes about. */
+    again?: boolean;
+}
+
+/** The file. Throws where no connection comes about, and where the signal aborts. */
+export async function fetchFile(url: string, signal: AbortSignal, { giveUp, fresh = false, again = true }: FetchOptions = {}): Promise<Fetched> {
+    const retries = again ? retriesMs.length : 0;
     for (let attempt = 0; ; ++attempt) {
         try {
             const fetched = await tryToFetch(url, signal, giveUp, fresh);
             if (fetched) return fetched;
-            if (attempt >= retriesMs.length) return { outcome: 'gone' };
+            if (attempt >= retries) return { outcome: 'gone' };
         } catch (error) {
             if (signal.aborted) throw error;
-            if (attempt >= retriesMs.length)
+            if (attempt >= retries)
                 throw new SourceError('network', `${url} could not be read: the connection failed, or the server does not allow pages of other sites to read it (CORS).`);
         }
         await new Promise((resolve) => setTimeout(resolve, retriesMs[attempt]));
