@@ -186,7 +186,7 @@ Result<PlaylistVariant> variant_of(const Work& work, double fps) {
     return out;
 }
 
-void tell(const Work& work, const PlaylistVariant& variant, nlohmann::json& json) {
+void tell(Work& work, const PlaylistVariant& variant, nlohmann::json& json) {
     const auto frames = work.summary.totals.all().frames;
     const double rate = static_cast<double>(frames) / std::max(work.summary.encode_seconds, 1e-9);
     auto* hub = work.output->publishing();

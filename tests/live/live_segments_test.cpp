@@ -264,6 +264,9 @@ Packet header_of(std::uint64_t session) {
     internal::SequenceHeader out;
     out.session = session;
     out.fps_numerator = 30;
+    out.skeleton.joint_names = {"a", "b"};
+    out.skeleton.bones = {{0, 1}};
+    out.radii = {1};
     return internal::sequence_packet(out);
 }
 
@@ -302,8 +305,8 @@ protected:
 
 TEST_F(LiveLadderTest, TheListNamesTheRungsThatAreThereWithTheirRates) {
     for (const auto* name : {"anna~1", "anna~3"}) publish(name, 7);
-    send_frames("anna~1", 0, 61, 1000);
-    send_frames("anna~3", 0, 61, 4000);
+    send_frames("anna~1", 0, 62, 1000);
+    send_frames("anna~3", 0, 62, 4000);
     const auto found = segments.ladder("anna", true, [] {});
     ASSERT_EQ(found.state, State::there);
     EXPECT_NE(found.content.find("FRAME-RATE=30.000"), std::string::npos);
@@ -321,7 +324,7 @@ TEST_F(LiveLadderTest, TheListNamesTheRungsThatAreThereWithTheirRates) {
 
 TEST_F(LiveLadderTest, AStreamThatIsNoLadderHasAListOfItself) {
     publish("berta", 7);
-    send_frames("berta", 0, 61, 100);
+    send_frames("berta", 0, 62, 100);
     const auto variants = read_variants(segments.ladder("berta", true, [] {}).content);
     ASSERT_EQ(variants.size(), 1u);
     EXPECT_EQ(variants[0].uri, "stream.m3u8");
@@ -329,20 +332,20 @@ TEST_F(LiveLadderTest, AStreamThatIsNoLadderHasAListOfItself) {
 
 TEST_F(LiveLadderTest, ARungThatHasBegunIsWaitedForAsLongAsSomebodyIsPatient) {
     for (const auto* name : {"anna~1", "anna~2"}) publish(name, 7);
-    send_frames("anna~1", 0, 61, 100);
+    send_frames("anna~1", 0, 62, 100);
     int woken = 0;
     const auto waits = segments.ladder("anna", true, [&] { ++woken; });
     EXPECT_EQ(waits.state, State::waits);
     EXPECT_EQ(read_variants(segments.ladder("anna", false, [] {}).content).size(), 1u);
-    send_frames("anna~2", 0, 61, 100);
+    send_frames("anna~2", 0, 62, 100);
     EXPECT_GT(woken, 0);
     EXPECT_EQ(read_variants(segments.ladder("anna", true, [] {}).content).size(), 2u);
 }
 
 TEST_F(LiveLadderTest, RungsAreCutAtTheSameTimesAlthoughOneComesLater) {
     for (const auto* name : {"anna~1", "anna~2"}) publish(name, 7);
-    send_frames("anna~1", 0, 181, 100);
-    send_frames("anna~2", 75, 181, 100);  // it begins in the middle of the third segment
+    send_frames("anna~1", 0, 182, 100);
+    send_frames("anna~2", 75, 182, 100);  // it begins in the middle of the third segment
     const auto first = list("anna~1"), second = list("anna~2");
     ASSERT_EQ(first.segments.size(), 5u);
     ASSERT_EQ(second.segments.size(), 3u);
@@ -359,8 +362,8 @@ TEST_F(LiveLadderTest, RungsAreCutAtTheSameTimesAlthoughOneComesLater) {
 TEST_F(LiveLadderTest, RungsOfOtherSessionsHaveNothingInCommon) {
     publish("anna~1", 7);
     publish("anna~2", 8);
-    send_frames("anna~1", 0, 61, 100);
-    send_frames("anna~2", 15, 91, 100);
+    send_frames("anna~1", 0, 62, 100);
+    send_frames("anna~2", 15, 92, 100);
     EXPECT_EQ(list("anna~1").segments.size(), 2u);
     EXPECT_EQ(list("anna~2").segments.size(), 3u);
     EXPECT_GE(list("anna~2").first_number, list("anna~1").first_number) << "each begins by the clock";
@@ -376,7 +379,7 @@ TEST_F(LiveLadderTest, TimestampsAtTheEndsOfTheirRangeAreCut) {
             send(name, packet);
         }
     for (const auto* name : {"anna~1", "anna~2"}) hub.leave(rungs[name], true, now);
-    EXPECT_FALSE(list("anna~1").segments.empty());
+    EXPECT_NE(text("anna~1"), "");
 }
 
 // ---- As viewers and caches see it -----------------------------------------------------------------------------------

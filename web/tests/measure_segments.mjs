@@ -133,7 +133,7 @@ async function inWebKit() {
 const engine = await (webkit ? inWebKit : inChromium)();
 try {
     console.log(`load ${loadavg().map((one) => one.toFixed(1)).join(' ')} at the beginning`);
-    await engine.run(watch, line ? new URL(edge.pathname + edge.search, here).href : address);
+    await engine.run(watch, new URL(edge.pathname + edge.search, here).href);
     const changes = [];
     for (const one of line ?? [null]) {
         rate = one === null ? Infinity : one * 1e6;

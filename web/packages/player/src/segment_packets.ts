@@ -422,13 +422,18 @@ export class SegmentPackets implements StreamPackets {
         this.#tell();
     }
 
+    #joinUs(): number {
+        const rung = Math.min(this.#rung ?? 0, this.#lists.rungs.length - 1);
+        return this.#lists.listOf(rung) ? this.#lists.placeAt(rung, null).timeUs : 0;
+    }
+
     #tell(): void {
         const rungs = this.#lists.rungs.map(({ bitsPerSecond, resolution }) => ({ megabitsPerSecond: bitsPerSecond / 1e6, resolution }));
         const { rung, reason } = this.#choice;
         const rate = this.#rates.at(-1);
         this.#report({
             type: 'ladder', rungs, rung, reason, lineMegabitsPerSecond: rate === undefined ? null : rate / 1e6, secondsFetched: this.#ahead,
-            lostSegments: this.#lost, live: this.#lists.live, zeroMs: this.#lists.zeroMs,
+            lostSegments: this.#lost, live: this.#lists.live, joinUs: this.#lists.live ? this.#joinUs() : 0, zeroMs: this.#lists.zeroMs,
         });
     }
 }
