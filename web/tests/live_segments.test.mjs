@@ -89,12 +89,29 @@ test('a viewer has each frame once, part by part, and goes up to the finer rung'
         return plain(url, more);
     };
     const notices = [];
-    const packets = new SegmentPackets(`${hub}/hls/berta/master.m3u8`, (text) => notices.push(text), () => undefined);
+    // Frames are taken as a player does that has something ahead, however fast the machine encodes: some for each part that comes.
+    let [may, wake] = [0, () => undefined];
+    const packets = new SegmentPackets(`${hub}/hls/berta/master.m3u8`, (text) => notices.push(text), ({ secondsFetched }) => {
+        if (secondsFetched >= 0.6) may += 8;
+        wake();
+    });
+    // At the end nothing comes any more.
+    const atTheEnd = setInterval(() => {
+        may += 8;
+        wake();
+    }, 3000);
+    const mayTake = async () => {
+        while (may <= 0) await new Promise((resolve) => (wake = resolve));
+        --may;
+    };
     try {
         const { timeUs } = await packets.seek(0);
         const shown = [];
-        for (let packet = await packets.next(); packet; packet = await packets.next())
-            if (isFrame(packet.kind) && !packet.passed) shown.push({ frame: packet.frame, timeUs: packet.timeUs, rung: packet.rung });
+        for (let packet = await packets.next(); packet; packet = await packets.next()) {
+            if (!isFrame(packet.kind) || packet.passed) continue;
+            shown.push({ frame: packet.frame, timeUs: packet.timeUs, rung: packet.rung });
+            await mayTake();
+        }
         assert.deepEqual(shown.map(({ frame }) => frame), Array.from({ length: shown.length }, (_, i) => shown[0].frame + i));
         assert.equal(shown.at(-1).frame, frames - 1);
         assert.ok(shown[0].timeUs <= timeUs && timeUs < shown.at(-1).timeUs, 'it begins where decoding can start for the place where playing begins');
@@ -107,6 +124,7 @@ test('a viewer has each frame once, part by part, and goes up to the finer rung'
         assert.equal(new Set(parts).size, parts.length, 'each is asked for once');
         assert.ok(asked.some((url) => /_HLS_msn=\d+&_HLS_part=\d+/.test(url)));
     } finally {
+        clearInterval(atTheEnd);
         globalThis.fetch = plain;
         packets.close();
     }
