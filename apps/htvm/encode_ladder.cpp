@@ -205,9 +205,10 @@ void tell(Work& work, const PlaylistVariant& variant, nlohmann::json& json) {
             json.back()["most_megabits_per_second"] = most;
         return;
     }
-    note(fmt::format("{}: {}, {:.2f} Mbit/s{}, encoded at {:.1f} frames/s{}", shown_place(work.plan.output.place),
-                     counted(frames, "frame"), average, hub ? "" : fmt::format(", at most {:.2f}", most), rate,
-                     not_sent > 0 ? fmt::format(", {} not sent, as the line did not take them in time", not_sent) : ""));
+    note(
+        fmt::format("{}: {}, {:.2f} Mbit/s{}, encoded at {:.1f} frames/s{}", shown_place(work.plan.output.place),
+                    counted(frames, "frame"), average, hub ? "" : fmt::format(", at most {:.2f}", most), rate,
+                    not_sent > 0 ? fmt::format(", {} not sent, as the line did not take them in time", not_sent) : ""));
 }
 
 // Of a stream that went to a hub only the mean is known.

@@ -257,7 +257,8 @@ TEST_F(LiveSegmentsTest, AStreamThatGivesWayLosesItsSegments) {
     EXPECT_GT(list().first_number, number);
 }
 
-// ---- Ladders ---------------------------------------------------------------------------------------------------------
+// ---- Ladders
+// ---------------------------------------------------------------------------------------------------------
 
 // A header that says of which session it is.
 Packet header_of(std::uint64_t session) {
@@ -288,7 +289,9 @@ protected:
             send(name, packet);
         }
     }
-    std::string text(const std::string& name) { return std::string(segments.playlist(name, {}, [] {}).content); }
+    std::string text(const std::string& name) {
+        return std::string(segments.playlist(name, {}, [] {}).content);
+    }
     Playlist list(const std::string& name) { return read_playlist(text(name)).value(); }
     static std::vector<std::string> dates_in(const std::string& text) {
         std::vector<std::string> out;
@@ -347,16 +350,15 @@ TEST_F(LiveLadderTest, RungsAreCutAtTheSameTimesAlthoughOneComesLater) {
     send_frames("anna~1", 0, 182, 100);
     send_frames("anna~2", 75, 182, 100);  // it begins in the middle of the third segment
     const auto first = list("anna~1"), second = list("anna~2");
-    ASSERT_EQ(first.segments.size(), 5u);
-    ASSERT_EQ(second.segments.size(), 3u);
+    ASSERT_EQ(first.segments.size(), 6u);
+    ASSERT_EQ(second.segments.size(), 4u);
     EXPECT_EQ(second.first_number, first.first_number + 2);
     EXPECT_NEAR(second.segments[0].seconds, 0.55, 0.06) << "up to where the other one is cut";
-    for (std::size_t i = 1; i < 3; ++i) EXPECT_EQ(second.segments[i].seconds, first.segments[2 + i].seconds);
+    for (std::size_t i = 1; i < 4; ++i) EXPECT_EQ(second.segments[i].seconds, first.segments[2 + i].seconds);
     const auto dates = dates_in(text("anna~1")), later = dates_in(text("anna~2"));
-    ASSERT_EQ(later.size(), 3u);
+    ASSERT_EQ(later.size(), 4u);
     EXPECT_NE(later[0], dates[2]);
-    EXPECT_EQ(later[1], dates[3]);
-    EXPECT_EQ(later[2], dates[4]);
+    for (std::size_t i = 1; i < 4; ++i) EXPECT_EQ(later[i], dates[2 + i]);
 }
 
 TEST_F(LiveLadderTest, RungsOfOtherSessionsHaveNothingInCommon) {

@@ -302,8 +302,8 @@ void LiveSegments::State::take(const std::string& name, const SharedPacket& pack
 
 void LiveSegments::State::read_header(const std::string& name, Work& work) {
     const std::span<const std::uint8_t> message(work.header->bytes);
-    const auto header = internal::read_sequence_header(
-        message.subspan(packet_header_bytes, message.size() - packet_overhead));
+    const auto header =
+        internal::read_sequence_header(message.subspan(packet_header_bytes, message.size() - packet_overhead));
     work.session = header ? header->session : 0;
     const std::lock_guard lock(mutex);
     streams[name].frames_per_second =

@@ -78,8 +78,8 @@ public:
         std::optional<std::uint64_t> part{};
     };
     Found playlist(const std::string& stream, const std::optional<Position>& position, const Wake& wake);
-    // The list of the playlists of a ladder's rungs, the streams NAME~1 to NAME~8, and of the stream NAME itself, as far
-    // as they are there. patient: while one of them has no segment yet, that is waited for.
+    // The list of the playlists of a ladder's rungs, the streams NAME~1 to NAME~8, and of the stream NAME itself, as
+    // far as they are there. patient: while one of them has no segment yet, that is waited for.
     Found ladder(const std::string& name, bool patient, const Wake& wake);
     // A map, a segment or a part.
     Found file(const std::string& stream, const std::string& name, const Wake& wake);
