@@ -105,7 +105,7 @@ test('who goes back within the window has that place, and who goes beyond the en
 test('a whole segment is fetched whole, one that is not part by part, and one that was begun in parts goes on so', async () => {
     const lists = await opened(list('#EXT-X-MEDIA-SEQUENCE:7', part('7.0'), part('7.1'), '#EXTINF:0.5,', '7.m4s', part('8.0')));
     const piece = (number, from) => {
-        const found = lists.piece(0, { number, part: from });
+        const found = lists.piece(0, { number, part: from }, true);
         return found?.url ? [found.url.replace('https://a.example/hls/anna/', ''), found.beginUs] : found;
     };
     assert.deepEqual(piece(7, 0), ['7.m4s', 0]);
@@ -121,9 +121,24 @@ test('what comes next is asked for by its place, and the list is there once that
     assert.ok(lists.waits(0));
     assert.deepEqual(lists.end(0), { number: 12, part: 1 });
     answer = () => list(...segments(10, 2), part('12.0'), part('12.1'));
-    assert.ok(await lists.waitFor(0, { number: 12, part: 1 }, signal));
+    assert.ok(await lists.waitFor(0, { number: 12, part: 1 }, true, signal));
     assert.equal(asked.at(-1), 'anna/stream.m3u8?_HLS_msn=12&_HLS_part=1');
     assert.equal(lists.endUs, 2.5e6);
+});
+
+test('who does not take parts has the segment once it is whole, and asks for that', async () => {
+    const lists = await opened(list(...segments(10, 2), part('12.0')));
+    assert.equal(lists.piece(0, { number: 12, part: 0 }, false), null);
+    answer = () => list(...segments(10, 3));
+    assert.ok(await lists.waitFor(0, { number: 12, part: 0 }, false, signal));
+    assert.equal(asked.at(-1), 'anna/stream.m3u8?_HLS_msn=12');
+    assert.equal(lists.piece(0, { number: 12, part: 0 }, false).part, null);
+});
+
+test('what it takes to read the list for each part is known by its length', async () => {
+    const text = list(...segments(10, 2), part('12.0'));
+    assert.equal((await opened(text)).bitsForParts(0), 8 * text.length * 4);
+    assert.equal((await opened(['#EXTM3U', '#EXT-X-MAP:URI="map"', ...segments(10, 2)].join('\n'))).bitsForParts(0), 0);
 });
 
 test('the query of a link is kept', async () => {
@@ -131,7 +146,7 @@ test('the query of a link is kept', async () => {
     answer = () => text;
     const lists = new parts.SegmentLists(`${base}?sign=a`);
     await lists.open(signal);
-    await lists.waitFor(0, { number: 12, part: 0 }, signal);
+    await lists.waitFor(0, { number: 12, part: 0 }, true, signal);
     assert.equal(asked.at(-1), 'anna/stream.m3u8?sign=a&_HLS_msn=12&_HLS_part=0');
 });
 
@@ -142,7 +157,7 @@ test('a server that says it waits, and does not, is asked three times, and again
     const lists = await opened(text);
     for (let i = 0; i < 3; ++i) {
         assert.ok(lists.waits(0));
-        assert.equal(await lists.waitFor(0, lists.end(0), signal), false);
+        assert.equal(await lists.waitFor(0, lists.end(0), true, signal), false);
     }
     assert.equal(lists.waits(0), false);
     answer = () => list(...segments(10, 3));
@@ -153,7 +168,7 @@ test('a server that says it waits, and does not, is asked three times, and again
 test('one that never answers is waited for as long as four segments, and not asked so again', async () => {
     const lists = await opened(list('#EXT-X-MEDIA-SEQUENCE:1', '#EXTINF:0.1,', 'a').replace('TARGETDURATION:1', 'TARGETDURATION:0.1'));
     answer = (_, aborts) => new Promise((_, reject) => aborts.addEventListener('abort', () => reject(new Error('aborted'))));
-    assert.equal(await lists.waitFor(0, lists.end(0), signal), false);
+    assert.equal(await lists.waitFor(0, lists.end(0), true, signal), false);
     assert.equal(lists.waits(0), false);
     assert.equal(asked.length, 2);
 });
@@ -161,7 +176,7 @@ test('one that never answers is waited for as long as four segments, and not ask
 test('one that has lost the stream is told nothing more than that', async () => {
     const lists = await opened(list(...segments(10, 2)));
     answer = () => null;
-    assert.equal(await lists.waitFor(0, lists.end(0), signal), false);
+    assert.equal(await lists.waitFor(0, lists.end(0), true, signal), false);
     assert.equal(lists.listOf(0).segments.length, 2, 'the last list stays');
 });
 
@@ -194,9 +209,9 @@ const noon = Date.UTC(2026, 0, 1, 12);
 test('segments of the same date are the same in all rungs, whatever their numbers', async () => {
     const lists = await withRungs(dated(100, 5, noon), dated(7, 4, noon + 2040));
     assert.deepEqual(lists.listOf(1).segments.map(({ number }) => number), [102, 103, 104, 105]);
-    assert.equal(lists.piece(1, { number: 103, part: 0 }).url, 'https://a.example/hls/anna~2/8.m4s');
+    assert.equal(lists.piece(1, { number: 103, part: 0 }, true).url, 'https://a.example/hls/anna~2/8.m4s');
     assert.equal(lists.beginUs(103), 3e6);
-    await lists.waitFor(1, { number: 106, part: 0 }, signal);
+    await lists.waitFor(1, { number: 106, part: 0 }, true, signal);
     assert.equal(asked.at(-1), 'anna~2/stream.m3u8?_HLS_msn=11&_HLS_part=0', 'its server is asked by its own numbers');
 });
 

@@ -16,6 +16,8 @@ const waitTargets = 4; // for so many target durations a server may let those wa
 interface Rung {
     variant: Variant;
     list: MediaPlaylist | null;
+    /** How long the list is. */
+    letters: number;
     readMs: number;
     failures: number;
     /** What is added to its own numbers. */
@@ -79,13 +81,13 @@ export class SegmentLists {
         if (this.#rungs.length > 0) return;
         const { text, url } = await this.#fetch(this.#url, signal);
         const read = readPlaylist(text, url);
-        const rung = (variant: Variant): Rung => ({ variant, list: null, readMs: 0, failures: 0, shift: 0, vain: 0, doesNotWait: false });
+        const rung = (variant: Variant): Rung => ({ variant, list: null, letters: 0, readMs: 0, failures: 0, shift: 0, vain: 0, doesNotWait: false });
         if ('variants' in read) {
             this.#rungs = read.variants.map(rung);
             await this.read(0, signal);
         } else {
             this.#rungs = [rung({ url: this.#url, bitsPerSecond: 0, resolution: '', codecs: '' })];
-            this.#take(this.#rungs[0]!, read.playlist);
+            this.#take(this.#rungs[0]!, read.playlist, text.length);
         }
         const { list } = this.#rungs[0]!;
         if (list!.ended && list!.segments.length === 0) throw new SourceError('empty', 'The playlist names no segment.');
@@ -123,13 +125,15 @@ export class SegmentLists {
         return endOf(this.#rungs[rung]!.list!);
     }
 
-    /** Asks for a list that has what is at the position, which is to come next: it comes once that is there. False where it did not. */
-    async waitFor(rung: number, position: Position, signal: AbortSignal): Promise<boolean> {
+    /** Asks for a list that has what is at the position, which is to come next: it comes once that is there, the whole segment where
+     * it is not taken in parts. False where it did not. */
+    async waitFor(rung: number, position: Position, inParts: boolean, signal: AbortSignal): Promise<boolean> {
         const one = this.#rungs[rung]!;
         const { partSeconds, targetSeconds } = one.list!;
         const address = new URL(one.variant.url);
         address.searchParams.set('_HLS_msn', `${position.number - one.shift}`);
-        if (partSeconds > 0) address.searchParams.set('_HLS_part', `${position.part}`);
+        const byPart = partSeconds > 0 && (inParts || position.part > 0);
+        if (byPart) address.searchParams.set('_HLS_part', `${position.part}`);
         const abort = new AbortController();
         const stop = (): void => abort.abort();
         const timer = setTimeout(() => {
@@ -146,15 +150,22 @@ export class SegmentLists {
             signal.removeEventListener('abort', stop);
         }
         const end = this.end(rung);
-        const has = one.list!.ended || end.number > position.number || (end.number === position.number && end.part > position.part);
+        const has = one.list!.ended || end.number > position.number || (byPart && end.number === position.number && end.part > position.part);
         if (!has) ++one.vain;
         return has;
     }
 
-    /** The piece to fetch there; 'over': the segment has no further part; null: the list has none. */
-    piece(rung: number, { number, part }: Position): Piece | 'over' | null {
+    /** Bits a second that it takes to read the list anew for each part. */
+    bitsForParts(rung: number): number {
+        const { list, letters } = this.#rungs[rung]!;
+        return list && list.partSeconds > 0 ? (8 * letters) / list.partSeconds : 0;
+    }
+
+    /** The piece to fetch there; 'over': the segment has no further part; null: the list has none. inParts: of a segment that is not
+     * whole, too. */
+    piece(rung: number, { number, part }: Position, inParts: boolean): Piece | 'over' | null {
         const { firstNumber, segments, open } = this.#rungs[rung]!.list!;
-        const segment = segments[number - firstNumber] ?? (open?.number === number ? open : null);
+        const segment = segments[number - firstNumber] ?? (inParts && open?.number === number ? open : null);
         if (!segment) return null;
         const { url, mapUrl, seconds, parts } = segment;
         const whole = url !== '';
@@ -206,7 +217,7 @@ export class SegmentLists {
             const read = readPlaylist(text, found);
             if ('variants' in read) throw new SourceError('not-htvm', 'The playlist cannot be read: it names lists of lists.');
             one.failures = 0;
-            this.#take(one, read.playlist);
+            this.#take(one, read.playlist, text.length);
             if (url === one.variant.url) one.readMs = begun;
         } catch (error) {
             one.readMs = performance.now();
@@ -220,7 +231,8 @@ export class SegmentLists {
         return { text: new TextDecoder().decode(fetched.bytes), url: fetched.url };
     }
 
-    #take(one: Rung, list: MediaPlaylist): void {
+    #take(one: Rung, list: MediaPlaylist, letters: number): void {
+        one.letters = letters;
         one.readMs = performance.now();
         one.shift = this.#shiftOf(list) ?? one.shift;
         if (one.shift !== 0) {

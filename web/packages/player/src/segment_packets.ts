@@ -17,6 +17,10 @@ const aheadSeconds = 4; // are fetched before they are decoded
 const keptToRise = 1.5; // seconds of a lower rung that are kept where the line brings much more
 const muchMore = 2;
 const ratesKept = 4;
+const leastBits = 8 * 16384; // that tell what the line brings,
+const mostMs = 400; // or fewer that took so long
+const shareForLists = 0.2; // of what the line brings
+const surelyBackwards = 3; // lists in a row that end before what comes next
 const mapsKept = 8;
 const mostUnreachable = 3; // segments in a row that do not come, before the stream counts as unreachable
 const freshenMs = 150; // a cache's first answer may be as old as its last viewer's: so soon the list is read again
@@ -54,6 +58,8 @@ export class SegmentPackets implements StreamPackets {
     #rung: number | null = null; // of the segment that was fetched last
     #tracks: Movie | null = null; // of the rung; null: its map is to be fetched
     #rates: number[] = [];
+    #came = { bits: 0, ms: 0 }; // since the last rate
+    #backwards = 0; // lists in a row that ended before what comes next
     #atMost = { number: -1, rung: 0 }; // of a segment that was given up in a higher rung
     #loaded: Loaded[] = [];
     #lost = 0; // segments, all or in part
@@ -113,7 +119,7 @@ export class SegmentPackets implements StreamPackets {
     // What a cache answers first may be old.
     async #freshen(rung: number, signal: AbortSignal): Promise<void> {
         if (!this.#lists.listOf(rung)) await this.#lists.read(rung, signal);
-        if (this.#lists.waits(rung) && (await this.#lists.waitFor(rung, this.#lists.end(rung), signal))) return;
+        if (this.#lists.waits(rung) && (await this.#lists.waitFor(rung, this.#lists.end(rung), true, signal))) return;
         await pause(freshenMs, signal);
         await this.#lists.read(rung, signal);
     }
@@ -238,7 +244,7 @@ export class SegmentPackets implements StreamPackets {
         const { rung } = this.#choice;
         if (!(await this.#haveList(rung, signal))) return 'later';
         const list = this.#lists.listOf(rung)!;
-        const piece = this.#lists.piece(rung, this.#next);
+        const piece = this.#lists.piece(rung, this.#next, this.#next.part > 0 || this.#takesParts(rung));
         if (piece === 'over') {
             this.#next = { number: this.#next.number + 1, part: 0 };
             this.#shownUs = -Infinity;
@@ -258,20 +264,28 @@ export class SegmentPackets implements StreamPackets {
 
     // Until the rung's list may know what comes next.
     async #awaitList(rung: number, signal: AbortSignal): Promise<void> {
-        const end = this.#lists.end(rung);
-        const comesNext = this.#next.number <= end.number;
-        if (comesNext && this.#lists.waits(rung) && (await this.#lists.waitFor(rung, this.#next, signal))) return;
+        // A list that does not know of it at all may be an old one, of a cache that nobody has asked for a while.
+        if (this.#lists.waits(rung) && (await this.#lists.waitFor(rung, this.#next, this.#takesParts(rung), signal))) return;
         await pause(Math.max(this.#lists.goodForMs(rung), 100), signal);
         if (!signal.aborted) await this.#lists.read(rung, signal);
+        if (signal.aborted || this.#next.number <= this.#lists.end(rung).number) return void (this.#backwards = 0);
         // A publisher that begins again begins its numbers again.
-        if (this.#next.number > this.#lists.end(rung).number && !signal.aborted) this.#goTo(this.#lists.placeAt(rung, null).number);
+        if (++this.#backwards < surelyBackwards) return;
+        this.#backwards = 0;
+        this.#goTo(this.#lists.placeAt(rung, null).number);
+    }
+
+    // Whether the line bears that the list is read anew for each part.
+    #takesParts(rung: number): boolean {
+        const line = this.#rates.at(-1);
+        return line === undefined || this.#lists.bitsForParts(rung) <= shareForLists * line;
     }
 
     // Whether the rung's list is there; it is read where it is not, or may know of the segment by now.
     async #haveList(rung: number, signal: AbortSignal): Promise<boolean> {
         const list = this.#lists.listOf(rung);
-        if (list && (list.ended || this.#lists.piece(rung, this.#next) !== null || this.#lists.goodForMs(rung) > 0)) return true;
-        if (list && this.#lists.waits(rung) && this.#next.number <= this.#lists.end(rung).number) return true;
+        if (list && (list.ended || this.#lists.piece(rung, this.#next, true) !== null || this.#lists.goodForMs(rung) > 0)) return true;
+        if (list && this.#lists.waits(rung)) return true;
         try {
             await this.#lists.read(rung, signal);
             return true;
@@ -335,12 +349,13 @@ export class SegmentPackets implements StreamPackets {
         const fetched = await this.#fetchPiece(piece, signal, giveUp);
         if (signal.aborted) return;
         if (fetched.outcome === 'gone') return this.#leaveOut(piece);
-        this.#measured(fetched.bitsPerSecond);
         if (fetched.outcome === 'given up') {
+            this.#measured(fetched.bitsPerSecond);
             this.#atMost = { number: piece.number, rung: rung - 1 };
             if (!begins) this.#beginAnew();
             return;
         }
+        this.#add(8 * fetched.bytes.length, fetched.ms);
         try {
             if (!map && hasOtherTracks(fetched.bytes, this.#tracks!)) {
                 map = await this.#map(piece, signal);
@@ -416,7 +431,15 @@ export class SegmentPackets implements StreamPackets {
         this.#tell();
     }
 
+    // Parts are small: several together tell what the line brings.
+    #add(bits: number, ms: number): void {
+        this.#came = { bits: this.#came.bits + bits, ms: this.#came.ms + ms };
+        if (this.#came.bits < leastBits && this.#came.ms < mostMs) return this.#tell();
+        this.#measured((1000 * this.#came.bits) / Math.max(this.#came.ms, 1));
+    }
+
     #measured(bitsPerSecond: number): void {
+        this.#came = { bits: 0, ms: 0 };
         this.#rates.push(bitsPerSecond);
         if (this.#rates.length > ratesKept) this.#rates.shift();
         this.#tell();
