@@ -3,7 +3,8 @@
 //   htvm serve --segments 1 --parts 0.25 --trust-proxy 127.0.0.1 &   nginx -c $PWD/examples/cdn/hub.conf &
 //   htvm encode CAPTURE --ladder 0.3,0.8,2 --segment 1 -o ws://localhost:8080/publish/NAME &
 //   node web/tests/measure_segments.mjs http://localhost:8088/hls/NAME/master.m3u8 [SECONDS] [--line 4,0.4,4] [--webkit]
-// In Chromium, which draws in software here; or in WebKitGTK, which needs a display (xvfb-run -a node ...). --line: what the line
+// In Chromium, which draws in software here; or in WebKitGTK, which needs a display (xvfb-run -a node ...); or, with --node, by the
+// player's fetching alone, whose frames are taken when they are due and not decoded, on machines that cannot draw in time. --line: what the line
 // carries, Mbit/s, one after the other, each for SECONDS, by a server between player and edge that sends so many bits a second
 // and no more, all answers together; without it as much as this machine does.
 // The dates in playlists say when frames came to the hub, by its clock, which must be this machine's.
@@ -12,15 +13,18 @@ import { readFile } from 'node:fs/promises';
 import { loadavg } from 'node:os';
 import { spawn } from 'node:child_process';
 import { fileURLToPath } from 'node:url';
+import { build } from 'esbuild';
+import { isFrame } from '../packages/decoder/dist/node.js';
 import { launch } from './browser.mjs';
 
 const given = process.argv.slice(2);
 const webkit = given.includes('--webkit');
+const inNode = given.includes('--node');
 const lineAt = given.indexOf('--line');
 const line = lineAt < 0 ? null : given[lineAt + 1].split(',').map(Number);
 const [address, seconds = '60'] = given.filter((word, i) => !word.startsWith('--') && (lineAt < 0 || i !== lineAt + 1));
 if (!address || !(Number(seconds) > 0) || line?.some((one) => !(one > 0))) {
-    console.error('usage: node web/tests/measure_segments.mjs http://HOST/hls/NAME/master.m3u8 [SECONDS] [--line MBITS,MBITS...] [--webkit]');
+    console.error('usage: node web/tests/measure_segments.mjs http://HOST/hls/NAME/master.m3u8 [SECONDS] [--line MBITS,MBITS...] [--webkit | --node]');
     process.exit(2);
 }
 const stallMs = 200; // without a new frame
@@ -128,9 +132,51 @@ async function inWebKit() {
     return { run, close };
 }
 
+// Instead of a browser: frames are shown when they are due, and time stands still where they are late.
+async function withoutDrawing() {
+    const { outputFiles } = await build({
+        entryPoints: [path('../packages/player/src/segment_packets.ts')], bundle: true, format: 'esm', platform: 'node', write: false, logLevel: 'error',
+    });
+    const { SegmentPackets } = await import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].contents).toString('base64')}`);
+    const decodedAheadMs = 300;
+    const shown = { frames: [], notices: [], ladder: [], begun: Date.now(), last: null };
+    let packets = null;
+    const note = (rung) => {
+        const { last } = shown;
+        const before = shown.ladder.at(-1);
+        if (last && (before?.fetched !== last.rung || before?.shown !== rung))
+            shown.ladder.push({ at: Date.now(), fetched: last.rung, shown: rung, reason: last.reason, ahead: last.secondsFetched });
+    };
+    const play = async (src) => {
+        let rung = null;
+        packets = new SegmentPackets(src, (text) => shown.notices.push(text), (report) => {
+            shown.last = report;
+            note(rung);
+        });
+        const { timeUs } = await packets.seek(0);
+        let startMs = null; // when media time 0 is shown
+        for (let packet = await packets.next(); packet; packet = await packets.next()) {
+            if (!isFrame(packet.kind) || packet.passed || packet.timeUs < timeUs - 1000) continue;
+            const now = Date.now();
+            startMs = Math.max(startMs ?? -Infinity, now - packet.timeUs / 1000);
+            const due = startMs + packet.timeUs / 1000;
+            const { timeUs: time, rung: its } = packet;
+            setTimeout(() => {
+                rung = its ?? 0;
+                note(rung);
+                const at = Date.now();
+                shown.frames.push({ at, time: time / 1e6, behind: shown.last?.live && shown.last.zeroMs !== null ? (at - shown.last.zeroMs - time / 1000) / 1000 : null });
+            }, Math.max(due - now, 0));
+            if (due - decodedAheadMs > now) await wait(due - decodedAheadMs - now);
+        }
+    };
+    const run = async (what, src) => (what === watch ? void play(src).catch((error) => shown.notices.push(String(error))) : shown);
+    return { run, close: async () => packets.close() };
+}
+
 // ---- what is told -------------------------------------------------------------------------------------------------------
 
-const engine = await (webkit ? inWebKit : inChromium)();
+const engine = await (inNode ? withoutDrawing : webkit ? inWebKit : inChromium)();
 try {
     console.log(`load ${loadavg().map((one) => one.toFixed(1)).join(' ')} at the beginning`);
     await engine.run(watch, new URL(edge.pathname + edge.search, here).href);
