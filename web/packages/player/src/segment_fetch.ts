@@ -3,9 +3,9 @@ import { SourceError } from './byte_source.js';
 
 const retriesMs = [250, 750, 2000];
 const mostBytes = 1 << 26;
-const lookEveryMs = 200;
+const lookEveryMs = 100;
 const rateOverMs = 600; // what the line brings now is measured over so long
-const leastMs = 400; // of a transfer, before it can be given up,
+const leastMs = 300; // of a transfer, before it can be given up,
 const leastSilentMs = 1000; // or of an answer that has not begun: a cache may be waiting for it
 
 /** How a transfer goes: bytes that have come, all that will (null: not told), and bits a second now. */

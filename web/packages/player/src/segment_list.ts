@@ -6,7 +6,7 @@ import { readPlaylist, type MediaPlaylist, type Segment, type Variant } from './
 import { fetchFile } from './segment_fetch.js';
 
 const edgeTargets = 3; // so many target durations before the end of a live list playing begins;
-const edgeTargetsAsked = 2; // so many where the server says at once what comes;
+const edgeTargetsAsked = 2.5; // so many where the server says at once what comes;
 const edgeParts = 3; // so many parts where there are parts, unless the list says how much
 const mostFailures = 8; // in a row, of a list that is read again
 const mostVain = 3; // in a row, of answers that do not have what was asked for
