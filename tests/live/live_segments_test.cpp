@@ -14,6 +14,7 @@
 #include "codec/format/sequence.h"
 #include "container/mp4_packets.h"
 #include "container/playlist.h"
+#include "live/hub/stream_name.h"
 #include "live/server/credentials.h"
 #include "live_packets.h"
 #include "server_test.h"
@@ -259,6 +260,16 @@ TEST_F(LiveSegmentsTest, AStreamThatGivesWayLosesItsSegments) {
 
 // ---- Ladders
 // ---------------------------------------------------------------------------------------------------------
+
+TEST(StreamName, ARungHasItsNumberBehindTheLaddersName) {
+    EXPECT_EQ(rung_name("anna", 2), "anna~2");
+    EXPECT_EQ(ladder_of("anna~2"), "anna");
+    for (const char* name : {"anna", "anna~0", "anna~9", "anna~12", "~"}) EXPECT_EQ(ladder_of(name), name);
+    for (const auto& name : {std::string("anna~1"), std::string("a~8"), std::string(64, 'a') + "~1"})
+        EXPECT_TRUE(is_stream_name(name)) << name;
+    for (const char* name : {"~1", "anna~", "anna~0", "anna~9", "anna~1~2", "an~na", ".a~1"})
+        EXPECT_FALSE(is_stream_name(name)) << name;
+}
 
 // A header that says of which session it is.
 Packet header_of(std::uint64_t session) {
