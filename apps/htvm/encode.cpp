@@ -16,7 +16,6 @@
 #include "encode_pass.h"
 #include "encode_settings.h"
 #include "htvm/running_time.hpp"
-#include "line_rate.h"
 #include "rate_passes.h"
 #include "rate_report.h"
 #include "rate_sharing.h"
@@ -270,13 +269,6 @@ Result<StreamOutput> open_output(const Passes& passes) {
     if (passes.audio) output->lay(*passes.audio);
     output->set(SegmentOptions{.seconds = passes.plan.segment_seconds});
     return output;
-}
-
-// A pass whose packets go to the hub asks it for key frames, and follows its line.
-void follow_hub(Pass& pass, Publishing& hub) {
-    pass.wants_key_frame = [&hub] { return hub.wants_key_frame(); };
-    if (!pass.rate.rate_controlled() || pass.plan.publishing.fixed_bitrate) return;
-    pass.bitrate = [&hub, line = LineRate(pass.rate.bits_per_second)]() mutable { return line.follow(hub.line()); };
 }
 
 // Codes all frames. What a pass that writes has made when it ends early is kept as far as it goes.

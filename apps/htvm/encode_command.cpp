@@ -27,16 +27,19 @@ void add_output(CLI::App& command, EncodeRequest& request) {
     command
         .add_option("--segment", request.segment_seconds,
                     "Of a playlist, -o NAME.m3u8: seconds that a segment lasts at least; it ends where players can\n"
-                    "start (default 2)")
+                    "start (default 2). Of a ladder that goes to a hub: seconds between places to start")
         ->check(CLI::Range(0.1, 60.0))
         ->type_name("SECONDS")
         ->group(heading::output);
     command
-        .add_option("--ladder", request.ladder,
-                    "Several qualities at once, from which players choose by their line, as segments that are cut at\n"
-                    "the same frames in all: -o NAME.m3u8 becomes the list of their playlists, NAME-1.m3u8 and so on,\n"
-                    "the coarsest first. Rates in Mbit/s, 0.3,0.8,2, or qualities, q35,q50,q65, or web (q30,q42,q60).\n"
-                    "The capture is read once, and the finest rung's tracking serves the others")
+        .add_option(
+            "--ladder", request.ladder,
+            "Several qualities at once, from which players choose by their line, as segments that are cut at\n"
+            "the same frames in all: -o NAME.m3u8 becomes the list of their playlists, NAME-1.m3u8 and so on,\n"
+            "the coarsest first. To a hub, -o ws://HOST:PORT/publish/NAME, they go as the streams NAME~1 and so\n"
+            "on, of which it makes the list (htvm serve --segments). Rates in Mbit/s, 0.3,0.8,2, or qualities, "
+            "q35,q50,q65, or web (q30,q42,q60).\n"
+            "The capture is read once, and the finest rung's tracking serves the others")
         ->type_name("RUNGS")
         ->group(heading::output);
 }

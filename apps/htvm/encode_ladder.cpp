@@ -6,6 +6,7 @@
 #include <cmath>
 #include <deque>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -18,6 +19,8 @@
 #include "io/mesh_file.h"
 #include "io/number_text.h"
 #include "io/output_file.h"
+#include "live/client/hub_address.h"
+#include "live/hub/stream_name.h"
 #include "segment_folder.h"
 #include "stream_file.h"
 
@@ -45,7 +48,14 @@ struct Work {
     std::optional<Pass> pass = {};
 };
 
-std::string rung_name(const std::string& place, std::size_t number) {
+// Of a hub's address, that of the stream which the rung is. Other hubs may be named without it.
+std::string rung_place(const std::string& place, std::size_t number) {
+    if (live::looks_like_hub_address(place)) {
+        const auto end = std::min(place.find('?'), place.size());
+        const auto publish = place.find("/publish/");
+        if (publish == std::string::npos || publish > end) return place;
+        return live::rung_name(place.substr(0, end), number) + place.substr(end);
+    }
     const fs::path path(place);
     return (path.parent_path() / fmt::format("{}-{}.m3u8", path.stem().string(), number)).string();
 }
@@ -53,7 +63,8 @@ std::string rung_name(const std::string& place, std::size_t number) {
 Result<EncodePlan> plan_of_rung(const EncodeRequest& request, const Rung& rung, std::size_t number) {
     auto own = request;
     own.ladder.clear();
-    own.output = rung_name(request.output, number);
+    own.output = rung_place(request.output, number);
+    for (auto& hub : own.publishing.other_hubs) hub = rung_place(hub, number);
     if (rung.bits_per_second > 0) {
         own.encoding.given.emplace_back(find_option("rate.bits_per_second"), rung.bits_per_second);
         own.encoding.passes = 1;
@@ -69,7 +80,8 @@ Result<EncodePlan> plan_of_rung(const EncodeRequest& request, const Rung& rung, 
 }
 
 Result<void> check(const EncodeRequest& request) {
-    if (!is_playlist_name(request.output)) return refused("is for segments: give a playlist, -o NAME.m3u8");
+    if (!is_playlist_name(request.output) && !destination_of(request.output).is_hub())
+        return refused("is for segments and hubs: -o NAME.m3u8, or -o ws://HOST:PORT/publish/NAME");
     if (request.encoding.profile != Profile::tracked) return refused("is for --profile tracked");
     if (request.chunks != 1 || request.jobs > 0 || request.job.of > 0)
         return refused("goes through the capture once: not with --chunks, --jobs or --job");
@@ -78,15 +90,18 @@ Result<void> check(const EncodeRequest& request) {
     return {};
 }
 
-// Asks for a place to start in the first frame at or behind each multiple of a segment's length.
-auto at_segments(double seconds) {
+// Asks for a place to start in the first frame at or behind each multiple of a segment's length: from the first frame
+// on in files; on a hub by the timestamps themselves, as it may see the first frame of a rung late.
+auto at_segments(double seconds, bool on_hub) {
     const auto length_us = static_cast<std::int64_t>(seconds * 1e6);
-    return
-        [length_us, first = std::optional<std::int64_t>(), last = std::int64_t{0}](std::int64_t timestamp_us) mutable {
-            if (!first) first = timestamp_us;
-            const auto segment = (timestamp_us - *first) / length_us;
-            return std::exchange(last, segment) != segment;
-        };
+    using Time = std::optional<std::int64_t>;
+    return [length_us, first = on_hub ? Time(0) : Time(), last = Time()](std::int64_t timestamp_us) mutable {
+        if (!first) first = timestamp_us;
+        const auto since = timestamp_us - *first;
+        const auto segment = since / length_us - (since % length_us < 0 ? 1 : 0);
+        const auto before = std::exchange(last, segment);
+        return before && *before != segment;
+    };
 }
 
 Result<void> open(Work& work, Capture& capture, const std::optional<AudioTrack>& audio, double segment_seconds) {
@@ -98,8 +113,9 @@ Result<void> open(Work& work, Capture& capture, const std::optional<AudioTrack>&
     work.rate.emplace(work.settings);
     const double of_all = work.settings.rate.bits_per_second;
     if (keeps_pictures(work.plan.capture.texture_as)) work.settings.rate.bits_per_second = share_of_meshes * of_all;
-    auto output = StreamOutput::open(work.plan.output.place);
+    auto output = StreamOutput::open(work.plan.output.place, work.plan.publishing);
     if (!output) return tl::unexpected(output.error());
+    if (!work.plan.is_piped) output->pace();
     output->set(SegmentOptions{.seconds = segment_seconds, .on_grid = true});
     if (audio) output->lay(*audio);
     work.output.emplace(std::move(*output));
@@ -123,8 +139,21 @@ void begin(Work& work, Capture& capture, double segment_seconds, FrameWarnings* 
                            .warnings = warnings,
                            .summary = work.summary,
                            .rate = *work.rate,
-                           .wants_access = at_segments(segment_seconds)});
+                           .wants_access = at_segments(segment_seconds, work.plan.output.is_hub())});
     if (work.pictures) work.pass->pictures = &*work.pictures;
+    if (auto* hub = work.output->publishing()) follow_hub(*work.pass, *hub);
+}
+
+// Where viewers of one rung need a key frame, all rungs have one: so they stay cut alike. The finest is asked first.
+void share_key_frames(std::deque<Work>& works) {
+    const auto wanted = std::make_shared<bool>(false);
+    for (auto& work : works) work.pass->wants_key_frame = [wanted] { return *wanted; };
+    works.back().pass->wants_key_frame = [wanted, &works] {
+        *wanted = false;
+        for (auto& work : works)
+            if (work.output->publishing()->wants_key_frame()) *wanted = true;
+        return *wanted;
+    };
 }
 
 // What the list of playlists says of a rung, by its files.
@@ -157,38 +186,65 @@ Result<PlaylistVariant> variant_of(const Work& work, double fps) {
     return out;
 }
 
-void tell(const Work& work, const PlaylistVariant& variant, nlohmann::json& json) {
+void tell(Work& work, const PlaylistVariant& variant, nlohmann::json& json) {
     const auto frames = work.summary.totals.all().frames;
     const double rate = static_cast<double>(frames) / std::max(work.summary.encode_seconds, 1e-9);
-    if (work.plan.json)
-        json.push_back({{"output", work.plan.output.place},
+    auto* hub = work.output->publishing();
+    const auto not_sent = hub ? hub->state().dropped_frames : 0;
+    const double average = 1e-6 * static_cast<double>(variant.average);
+    const double most = 1e-6 * static_cast<double>(variant.bits_per_second);
+    if (work.plan.json) {
+        json.push_back({{"output", shown_place(work.plan.output.place)},
                         {"bytes", work.output->bytes()},
                         {"frames", frames},
-                        {"megabits_per_second", 1e-6 * static_cast<double>(variant.average)},
-                        {"most_megabits_per_second", 1e-6 * static_cast<double>(variant.bits_per_second)},
+                        {"megabits_per_second", average},
                         {"encode_seconds", work.summary.encode_seconds}});
-    else
-        note(fmt::format("{}: {}, {:.2f} Mbit/s, at most {:.2f}, encoded at {:.1f} frames/s",
-                         shown_place(work.plan.output.place), counted(frames, "frame"),
-                         1e-6 * static_cast<double>(variant.average),
-                         1e-6 * static_cast<double>(variant.bits_per_second), rate));
+        if (hub)
+            json.back()["not_sent_frames"] = not_sent;
+        else
+            json.back()["most_megabits_per_second"] = most;
+        return;
+    }
+    note(
+        fmt::format("{}: {}, {:.2f} Mbit/s{}, encoded at {:.1f} frames/s{}", shown_place(work.plan.output.place),
+                    counted(frames, "frame"), average, hub ? "" : fmt::format(", at most {:.2f}", most), rate,
+                    not_sent > 0 ? fmt::format(", {} not sent, as the line did not take them in time", not_sent) : ""));
 }
 
-// The ends of all rungs, and the list of their playlists, which is there once they are.
+// Of a stream that went to a hub only the mean is known.
+PlaylistVariant published_variant(const Work& work, double fps) {
+    const auto& summary = work.summary;
+    const double seconds =
+        seconds_of_frames(summary.first_us, summary.last_us, std::max<std::size_t>(summary.frames, 1), 1 / fps);
+    PlaylistVariant out;
+    out.average = static_cast<std::uint64_t>(8.0 * static_cast<double>(work.output->bytes()) / std::max(seconds, 0.1));
+    return out;
+}
+
+// The ends of all rungs, and the list of their playlists, which is there once they are; a hub makes its own.
 Result<void> conclude(std::deque<Work>& works, const std::string& place, double fps) {
+    const bool on_hub = works.front().plan.output.is_hub();
     std::vector<PlaylistVariant> variants;
     auto json = nlohmann::json::array();
     for (auto& work : works) {
         if (work.summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
         if (work.summary.bounds) work.output->add_bounds(*work.summary.bounds);
         if (auto finished = work.output->finish(); !finished) return finished;
-        auto variant = variant_of(work, fps);
+        auto variant = on_hub ? published_variant(work, fps) : variant_of(work, fps);
         if (!variant) return tl::unexpected(variant.error());
         tell(work, *variant, json);
         variants.push_back(std::move(*variant));
     }
-    if (works.front().plan.json) fmt::print("{}\n", nlohmann::json{{"output", place}, {"rungs", json}}.dump(2));
-    return write_file(place, write_variants(variants));
+    if (works.front().plan.json)
+        fmt::print("{}\n", nlohmann::json{{"output", shown_place(place)}, {"rungs", json}}.dump(2));
+    return on_hub ? Result<void>() : write_file(place, write_variants(variants));
+}
+
+// What viewers of a hub have not got yet they get; of files nothing is left.
+Result<void> ended_early(std::deque<Work>& works, const Error& error) {
+    for (auto& work : works)
+        if (auto* hub = work.output->publishing(); hub && finish(*work.pass)) (void)hub->finish();
+    return tl::unexpected(error);
 }
 
 }  // namespace
@@ -238,6 +294,8 @@ Result<void> encode_ladder(const EncodeRequest& request) {
         if (!plan) return tl::unexpected(plan.error());
         works.push_back({std::move(*plan)});
     }
+    // By which the hub knows that they belong together.
+    for (auto& work : works) work.plan.encoder.session = works.front().plan.encoder.session;
     auto capture = Capture::open(works.front().plan.capture);
     if (!capture) return tl::unexpected(capture.error());
     const auto audio = AudioTrack::open(request.audio);
@@ -254,13 +312,15 @@ Result<void> encode_ladder(const EncodeRequest& request) {
     std::vector<Pass*> passes;
     for (auto work = works.rbegin(); work != works.rend(); ++work) {
         const bool first = &*work == &finest;
+        auto* hub = work->output->publishing();
         begin(*work, *capture, request.segment_seconds, first ? &warnings : nullptr,
-              [&progress, first](const auto& text) {
-                  if (first) progress.step(text);
+              [&progress, first, hub](const auto& text) {
+                  if (first) progress.step(hub ? text + ", " + hub->progress() : text);
               });
         passes.push_back(&*work->pass);
     }
-    if (auto done = encode_frames(passes); !done) return done;
+    if (works.front().plan.output.is_hub()) share_key_frames(works);
+    if (auto done = encode_frames(passes); !done) return ended_early(works, done.error());
     for (auto* pass : passes)
         if (auto done = finish(*pass); !done) return done;
     return conclude(works, request.output, capture->fps());

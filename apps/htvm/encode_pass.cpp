@@ -7,6 +7,7 @@
 
 #include "codec/format/frame_kinds.h"
 #include "command_line/terminal.h"
+#include "line_rate.h"
 
 namespace htvm::app {
 namespace {
@@ -391,6 +392,12 @@ Result<void> encode_frames(std::span<Pass* const> passes) {
         }
     }
     return first.is_stopped() ? stopped() : Result<void>();
+}
+
+void follow_hub(Pass& pass, Publishing& hub) {
+    pass.wants_key_frame = [&hub] { return hub.wants_key_frame(); };
+    if (!pass.rate.rate_controlled() || pass.plan.publishing.fixed_bitrate) return;
+    pass.bitrate = [&hub, line = LineRate(pass.rate.bits_per_second)]() mutable { return line.follow(hub.line()); };
 }
 
 Result<void> finish(Pass& pass) {

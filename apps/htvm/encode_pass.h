@@ -90,6 +90,9 @@ Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const 
                                                   const EncoderOptions& settings,
                                                   std::optional<double> quality = std::nullopt);
 
+// A pass whose packets go to the hub asks it for key frames, and follows its line.
+void follow_hub(Pass& pass, Publishing& hub);
+
 // Ends with an error of any kind where it is stopped.
 Result<void> encode_frames(Pass& pass);
 // Several passes over the same capture, which is read once: each frame goes into the first one first.

@@ -38,6 +38,9 @@ Result<void> link(const Options& options) {
         return fail(ErrorKind::bad_input, fmt::format("'{}' is no name of a live stream: {}; --file makes a link to a "
                                                       "file",
                                                       options.name, live::stream_name_rule));
+    if (const std::string ladder(live::ladder_of(options.name)); !options.file && ladder != options.name)
+        return fail(ErrorKind::bad_input,
+                    fmt::format("{} is a rung of {}, whose link is for all rungs", options.name, ladder));
     const auto served = live::path_segments('/' + in_address(options.name));
     const auto ends = [&](const char* ending) { return options.name.ends_with(ending); };
     if (options.file && (!served || served->empty() || !(ends(".htvm") || ends(".png") || ends(".jpg"))))

@@ -222,11 +222,12 @@ Result<void> check_whole(const StreamInput& input, const std::string& path, cons
         return fail(ErrorKind::limit, fmt::format("{} has {} larger than --max-packet; raise --max-packet to read all",
                                                   path, counted(input.oversized_packets(), "packet")));
     if (const auto lost = input.lost_segments(); lost > 0)
-        return fail(
-            ErrorKind::corrupt_stream,
-            fmt::format("{}{}; {}", input.first_loss(),
-                        lost > 1 ? fmt::format("; {} more are left out, too", counted(lost - 1, "segment")) : "",
-                        advice));
+        return fail(ErrorKind::corrupt_stream,
+                    fmt::format("{}{}; {}", input.first_loss(),
+                                lost > 1 ? fmt::format("; {} more {} left out, too", counted(lost - 1, "segment"),
+                                                       lost > 2 ? "are" : "is")
+                                         : "",
+                                advice));
     if (input.missing_bytes() > 0)
         return fail(ErrorKind::corrupt_stream, fmt::format("{} is cut short: its end, {}, is missing; {}", path,
                                                            counted(input.missing_bytes(), "byte"), advice));

@@ -27,6 +27,7 @@ struct SegmentCuts {
     double part_seconds = 0;  // it comes in parts that last no longer, unless a single frame does; 0: whole
     bool on_grid = false;  // it ends at the first such place at or behind a multiple of `seconds`, so that streams of
                            // the same frames, in which decoding can start there, are cut alike
+    std::int64_t grid_us = 0;  // with on_grid: one of these multiples, from the stream's first frame; not behind it
 };
 
 // Cuts a stream where decoding can start.
@@ -35,7 +36,8 @@ public:
     explicit RangeCutter(const SegmentCuts& cuts)
         : least_us_(static_cast<std::int64_t>(cuts.seconds * 1e6)),
           part_us_(static_cast<std::int64_t>(cuts.part_seconds * 1e6)),
-          on_grid_(cuts.on_grid) {}
+          on_grid_(cuts.on_grid),
+          grid_us_(cuts.grid_us) {}
     // Gives out the range before, when the next one begins.
     std::optional<SampleRange> push(StreamSample sample);
     std::optional<SampleRange> finish(std::uint64_t total_us);
@@ -45,10 +47,12 @@ public:
 private:
     std::optional<SampleRange> cut(std::int64_t end_us, bool next_begins);
     bool is_long(std::int64_t time) const {
-        return on_grid_ ? time / least_us_ > begin_us_ / least_us_ : time - begin_us_ >= least_us_;
+        return on_grid_ ? (time - grid_us_) / least_us_ > (begin_us_ - grid_us_) / least_us_
+                        : time - begin_us_ >= least_us_;
     }
     std::int64_t least_us_, part_us_;
     bool on_grid_;
+    std::int64_t grid_us_;
     std::int64_t begin_us_ = 0;  // of the whole range
     std::uint16_t entry_ = 0;    // likewise
     SampleRange range_;

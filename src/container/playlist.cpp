@@ -123,12 +123,16 @@ std::string date(std::int64_t unix_ms) {
     return std::string(out.data()) + thousandths.data();
 }
 
-// What a playlist of parts says: players ask for what is not there yet, and stay so far behind the end.
+// That players may ask for what is not there yet, and how far they are to stay behind the end where there are parts.
 std::string live_control(const Playlist& playlist) {
     constexpr double parts_behind = 3;
-    return "#EXT-X-SERVER-CONTROL:CAN-BLOCK-RELOAD=YES,PART-HOLD-BACK=" +
-           decimal(parts_behind * playlist.part_seconds) +
-           "\n#EXT-X-PART-INF:PART-TARGET=" + decimal(playlist.part_seconds) + "\n";
+    const bool in_parts = playlist.part_seconds > 0;
+    if (!in_parts && !playlist.waits) return "";
+    std::string out = std::string("#EXT-X-SERVER-CONTROL:") + (playlist.waits ? "CAN-BLOCK-RELOAD=YES" : "");
+    if (in_parts)
+        out += (playlist.waits ? "," : "") + ("PART-HOLD-BACK=" + decimal(parts_behind * playlist.part_seconds)) +
+               "\n#EXT-X-PART-INF:PART-TARGET=" + decimal(playlist.part_seconds);
+    return out + "\n";
 }
 
 // What comes before a segment's own name, or before that of its next part.
@@ -152,7 +156,7 @@ std::string write_playlist(const Playlist& playlist) {
     const bool in_parts = playlist.part_seconds > 0;
     std::string out = std::string("#EXTM3U\n#EXT-X-VERSION:") + (in_parts ? "9" : "7") + "\n";
     out += "#EXT-X-TARGETDURATION:" + std::to_string(static_cast<long>(std::ceil(longest_segment - 0.0005))) + "\n";
-    if (in_parts) out += live_control(playlist);
+    out += live_control(playlist);
     out += "#EXT-X-MEDIA-SEQUENCE:" + std::to_string(playlist.first_number) + "\n";
     if (playlist.first_discontinuity > 0)
         out += "#EXT-X-DISCONTINUITY-SEQUENCE:" + std::to_string(playlist.first_discontinuity) + "\n";
@@ -244,11 +248,12 @@ std::string two_digits(unsigned value) {
     return {static_cast<char>('0' + value / 10), static_cast<char>('0' + value % 10)};
 }
 
+constexpr std::size_t visual_fields = 78;  // of a sample entry of pictures, before its boxes
+
 // As "av01.0.08M.08" or "vp09.00.31.08", by the record of its configuration.
 std::string codec_of(const MediaBox& entry) {
     if (entry.type == four("Opus")) return "opus";
     if (entry.type == four("htvm")) return "htvm";
-    constexpr std::size_t visual_fields = 78;
     if (entry.inside.size() < visual_fields) return {};
     const auto inside = entry.inside.subspan(visual_fields);
     if (const auto record = find_box(inside, four("av1C")); record && record->inside.size() >= 4) {
@@ -264,12 +269,11 @@ std::string codec_of(const MediaBox& entry) {
     return {};
 }
 
-}  // namespace
-
-std::string codecs_of(std::span<const std::uint8_t> map) {
+// The first sample entry of each track that a map has.
+std::vector<MediaBox> entries_of(std::span<const std::uint8_t> map) {
+    std::vector<MediaBox> out;
     const auto movie = find_box(map, four("moov"));
-    if (!movie) return {};
-    std::string out;
+    if (!movie) return out;
     BoxReader in(movie->inside);
     while (const auto track = in.next()) {
         if (track->type != four("trak")) continue;
@@ -279,11 +283,31 @@ std::string codecs_of(std::span<const std::uint8_t> map) {
         constexpr std::size_t count_fields = 8;
         if (!box || box->inside.size() < count_fields) continue;
         BoxReader entries(box->inside.subspan(count_fields));
-        const auto entry = entries.next();
-        const auto codec = entry ? codec_of(*entry) : std::string();
-        if (!codec.empty()) out += (out.empty() ? "" : ",") + codec;
+        if (const auto entry = entries.next()) out.push_back(*entry);
     }
     return out;
+}
+
+}  // namespace
+
+std::string codecs_of(std::span<const std::uint8_t> map) {
+    std::string out;
+    for (const auto& entry : entries_of(map))
+        if (const auto codec = codec_of(entry); !codec.empty()) out += (out.empty() ? "" : ",") + codec;
+    return out;
+}
+
+PictureSize picture_size_of(std::span<const std::uint8_t> map) {
+    constexpr std::size_t width_at = 24, height_at = 26;
+    for (const auto& entry : entries_of(map)) {
+        const bool pictures = entry.type == four("av01") || entry.type == four("vp09");
+        if (!pictures || entry.inside.size() < visual_fields) continue;
+        const auto number_at = [&](std::size_t at) {
+            return static_cast<std::uint32_t>(entry.inside[at] << 8 | entry.inside[at + 1]);
+        };
+        return {number_at(width_at), number_at(height_at)};
+    }
+    return {};
 }
 
 bool is_name_below(std::string_view uri) {

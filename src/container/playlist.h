@@ -43,6 +43,7 @@ struct Playlist {
 
     // Written, and passed over when read:
     std::uint64_t first_discontinuity = 0;  // how many there were before the first segment that is listed
+    bool waits = false;                     // who asks for what comes next has the answer once it is there
     double part_seconds = 0;                // that no part is longer than; 0: there are none
     PlaylistSegment next{};                 // the segment that is not whole: its map and the parts that are there
     std::string hint{};                     // the part that comes next
@@ -69,6 +70,12 @@ std::vector<PlaylistVariant> read_variants(std::string_view text);
 // The codecs of the tracks that a map has (the boxes ftyp and moov), as a list of playlists names them; empty if it has
 // none.
 std::string codecs_of(std::span<const std::uint8_t> map);
+
+// The size of its pictures; 0 where it has none.
+struct PictureSize {
+    std::uint32_t width = 0, height = 0;
+};
+PictureSize picture_size_of(std::span<const std::uint8_t> map);
 
 // Whether an URI of a playlist names a file beside it, or in a folder below: nothing else of a file system is to be
 // read because a playlist says so.

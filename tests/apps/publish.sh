@@ -123,6 +123,29 @@ else
     echo "openssl is not installed: TLS is not tried"
 fi
 
+# A ladder goes to the hub as streams of their own, of which it makes a list; the publisher's token and viewers' links are
+# those of the ladder.
+"$htvm" synth step --frames 75 --vertices 300 >/dev/null 2>&1
+rm -f publishers.json
+HTVM_TOKEN=$("$htvm" serve --publishers publishers.json --add-publisher person 2>/dev/null)
+export HTVM_TOKEN
+expect 1 "whose token is for all rungs" "$htvm" serve --publishers publishers.json --add-publisher person~1
+"$htvm" serve --link-keys keys.json --add-link-key >/dev/null 2>&1
+hub ladder 0 --segments 1 --publishers publishers.json --link-keys keys.json
+expect 0 "person~2: 75 frames" "$htvm" encode step --ladder q20,q50 --segment 1 --effort 1 --end \
+    -o "ws://$address/publish/person"
+expect 1 "whose link is for all rungs" "$htvm" link person~1 --for 1h --keys keys.json --segments
+list=$("$htvm" link person --for 1h --keys keys.json --segments --url "http://$address" | sed s/stream.m3u8/master.m3u8/)
+expect 0 "75 frames" "$htvm" info "$list"
+"$htvm" pack "$list" -o from_hub.htvm 2>pack.err || fail "the ladder's finest rung: $(cat pack.err)"
+"$htvm" encode step -q 50 --effort 1 -o alone.htvm 2>/dev/null
+size() { stat -c %s "$1"; }
+[ "$(size from_hub.htvm)" -gt $(($(size alone.htvm) / 2)) ] && [ "$(size from_hub.htvm)" -lt $(($(size alone.htvm) * 2)) ] ||
+    fail "the finest rung has $(size from_hub.htvm) bytes, alone it has $(size alone.htvm)"
+expect 1 "401" "$htvm" encode step --ladder q20,q50 --effort 1 -o "ws://$address/publish/other"
+unset HTVM_TOKEN
+expect 1 "is for segments and hubs" "$htvm" encode step --ladder q20,q50 -o step.htvm
+
 # What is wrong is said.
 expect 1 "does not begin with ws://" "$htvm" publish walk.htvm "http://$address/publish/a"
 expect 1 "1 to 65535" "$htvm" decode "ws://localhost:0/watch/a" -o nothing

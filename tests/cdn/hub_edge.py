@@ -215,6 +215,9 @@ def check_links(bench):
     assert status(EDGE, good) == 200
     assert status(EDGE, other) == 403, status(EDGE, other)
     assert status(HUB, "/hls/anna/stream.m3u8") == 403
+    ladder, headers = get(EDGE, good.replace("stream.m3u8", "master.m3u8"))
+    assert names_in(ladder.decode()) == ["stream.m3u8"] and headers["Cache-Control"] == "public, max-age=1"
+    assert status(EDGE, other.replace("stream.m3u8", "master.m3u8")) == 403
     for name in names_in(get(EDGE, good)[0].decode()):
         get(EDGE, good.replace("stream.m3u8", name))
     # Another link has from the cache what this one has fetched, and one that is none has nothing of it.

@@ -5,12 +5,16 @@
 
 #include <chrono>
 #include <ctime>
+#include <limits>
+#include <map>
 #include <regex>
 #include <string>
 #include <vector>
 
+#include "codec/format/sequence.h"
 #include "container/mp4_packets.h"
 #include "container/playlist.h"
+#include "live/hub/stream_name.h"
 #include "live/server/credentials.h"
 #include "live_packets.h"
 #include "server_test.h"
@@ -254,6 +258,143 @@ TEST_F(LiveSegmentsTest, AStreamThatGivesWayLosesItsSegments) {
     EXPECT_GT(list().first_number, number);
 }
 
+// ---- Ladders
+// ---------------------------------------------------------------------------------------------------------
+
+TEST(StreamName, ARungHasItsNumberBehindTheLaddersName) {
+    EXPECT_EQ(rung_name("anna", 2), "anna~2");
+    EXPECT_EQ(ladder_of("anna~2"), "anna");
+    for (const char* name : {"anna", "anna~0", "anna~9", "anna~12", "~"}) EXPECT_EQ(ladder_of(name), name);
+    for (const auto& name : {std::string("anna~1"), std::string("a~8"), std::string(64, 'a') + "~1"})
+        EXPECT_TRUE(is_stream_name(name)) << name;
+    for (const char* name : {"~1", "anna~", "anna~0", "anna~9", "anna~1~2", "an~na", ".a~1"})
+        EXPECT_FALSE(is_stream_name(name)) << name;
+}
+
+// A header that says of which session it is.
+Packet header_of(std::uint64_t session) {
+    internal::SequenceHeader out;
+    out.session = session;
+    out.fps_numerator = 30;
+    out.skeleton.joint_names = {"a", "b"};
+    out.skeleton.bones = {{0, 1}};
+    out.radii = {1};
+    return internal::sequence_packet(out);
+}
+
+class LiveLadderTest : public testing::Test {
+protected:
+    void publish(const std::string& name, std::uint64_t session) {
+        rungs[name] = *hub.publish(
+            name, [] {}, now);
+        send(name, header_of(session));
+    }
+    void send(const std::string& name, const Packet& packet) {
+        ASSERT_TRUE(hub.receive_packet(rungs[name], write_packet(packet), now));
+    }
+    // 30 a second; the first one and each that begins a second can be decoded by itself.
+    void send_frames(const std::string& name, std::uint32_t first, std::uint32_t end, std::size_t bytes) {
+        for (auto frame = first; frame < end; ++frame) {
+            auto packet = frame == first || frame % 30 == 0 ? live_intra(frame, bytes) : live_tracked(frame, bytes);
+            packet.timestamp_us = std::int64_t{1000000} * frame / 30;
+            send(name, packet);
+        }
+    }
+    std::string text(const std::string& name) {
+        return std::string(segments.playlist(name, {}, [] {}).content);
+    }
+    Playlist list(const std::string& name) { return read_playlist(text(name)).value(); }
+    static std::vector<std::string> dates_in(const std::string& text) {
+        std::vector<std::string> out;
+        for (std::size_t at = 0; (at = text.find("DATE-TIME:", at)) != std::string::npos; ++at)
+            out.push_back(text.substr(at + 10, text.find('\n', at) - at - 10));
+        return out;
+    }
+
+    Hub::Clock::time_point now{};
+    Hub hub;
+    LiveSegments segments{{.seconds = 1}, hub};
+    std::map<std::string, Hub::Publisher> rungs;
+};
+
+TEST_F(LiveLadderTest, TheListNamesTheRungsThatAreThereWithTheirRates) {
+    for (const auto* name : {"anna~1", "anna~3"}) publish(name, 7);
+    send_frames("anna~1", 0, 62, 1000);
+    send_frames("anna~3", 0, 62, 4000);
+    const auto found = segments.ladder("anna", true, [] {});
+    ASSERT_EQ(found.state, State::there);
+    EXPECT_NE(found.content.find("FRAME-RATE=30.000"), std::string::npos);
+    const auto variants = read_variants(found.content);
+    ASSERT_EQ(variants.size(), 2u);
+    EXPECT_EQ(variants[0].uri, "../anna~1/stream.m3u8");
+    EXPECT_EQ(variants[1].uri, "../anna~3/stream.m3u8");
+    EXPECT_EQ(variants[0].codecs, "htvm");
+    EXPECT_NEAR(static_cast<double>(variants[0].average), 30 * 8 * 1000, 20000);
+    EXPECT_NEAR(static_cast<double>(variants[1].average), 30 * 8 * 4000, 20000);
+    EXPECT_GE(variants[1].bits_per_second, variants[1].average);
+    EXPECT_EQ(segments.ladder("ann", true, [] {}).state, State::nothing);
+    EXPECT_EQ(segments.ladder("anna~1", true, [] {}).state, State::nothing) << "a rung has none";
+}
+
+TEST_F(LiveLadderTest, AStreamThatIsNoLadderHasAListOfItself) {
+    publish("berta", 7);
+    send_frames("berta", 0, 62, 100);
+    const auto variants = read_variants(segments.ladder("berta", true, [] {}).content);
+    ASSERT_EQ(variants.size(), 1u);
+    EXPECT_EQ(variants[0].uri, "stream.m3u8");
+}
+
+TEST_F(LiveLadderTest, ARungThatHasBegunIsWaitedForAsLongAsSomebodyIsPatient) {
+    for (const auto* name : {"anna~1", "anna~2"}) publish(name, 7);
+    send_frames("anna~1", 0, 62, 100);
+    int woken = 0;
+    const auto waits = segments.ladder("anna", true, [&] { ++woken; });
+    EXPECT_EQ(waits.state, State::waits);
+    EXPECT_EQ(read_variants(segments.ladder("anna", false, [] {}).content).size(), 1u);
+    send_frames("anna~2", 0, 62, 100);
+    EXPECT_GT(woken, 0);
+    EXPECT_EQ(read_variants(segments.ladder("anna", true, [] {}).content).size(), 2u);
+}
+
+TEST_F(LiveLadderTest, RungsAreCutAtTheSameTimesAlthoughOneComesLater) {
+    for (const auto* name : {"anna~1", "anna~2"}) publish(name, 7);
+    send_frames("anna~1", 0, 182, 100);
+    send_frames("anna~2", 75, 182, 100);  // it begins in the middle of the third segment
+    const auto first = list("anna~1"), second = list("anna~2");
+    ASSERT_EQ(first.segments.size(), 6u);
+    ASSERT_EQ(second.segments.size(), 4u);
+    EXPECT_EQ(second.first_number, first.first_number + 2);
+    EXPECT_NEAR(second.segments[0].seconds, 0.55, 0.06) << "up to where the other one is cut";
+    for (std::size_t i = 1; i < 4; ++i) EXPECT_EQ(second.segments[i].seconds, first.segments[2 + i].seconds);
+    const auto dates = dates_in(text("anna~1")), later = dates_in(text("anna~2"));
+    ASSERT_EQ(later.size(), 4u);
+    EXPECT_NE(later[0], dates[2]);
+    for (std::size_t i = 1; i < 4; ++i) EXPECT_EQ(later[i], dates[2 + i]);
+}
+
+TEST_F(LiveLadderTest, RungsOfOtherSessionsHaveNothingInCommon) {
+    publish("anna~1", 7);
+    publish("anna~2", 8);
+    send_frames("anna~1", 0, 62, 100);
+    send_frames("anna~2", 15, 92, 100);
+    EXPECT_EQ(list("anna~1").segments.size(), 2u);
+    EXPECT_EQ(list("anna~2").segments.size(), 3u);
+    EXPECT_GE(list("anna~2").first_number, list("anna~1").first_number) << "each begins by the clock";
+}
+
+TEST_F(LiveLadderTest, TimestampsAtTheEndsOfTheirRangeAreCut) {
+    constexpr auto least = std::numeric_limits<std::int64_t>::min(), most = std::numeric_limits<std::int64_t>::max();
+    for (const auto* name : {"anna~1", "anna~2"}) publish(name, 7);
+    for (const auto* name : {"anna~1", "anna~2"})
+        for (std::uint32_t frame = 0; frame < 4; ++frame) {
+            auto packet = live_intra(frame);
+            packet.timestamp_us = frame % 2 ? most : least;
+            send(name, packet);
+        }
+    for (const auto* name : {"anna~1", "anna~2"}) hub.leave(rungs[name], true, now);
+    EXPECT_NE(text("anna~1"), "");
+}
+
 // ---- As viewers and caches see it -----------------------------------------------------------------------------------
 
 class SegmentsServerTest : public ServerTest {
@@ -323,6 +464,29 @@ TEST_F(SegmentsServerTest, ALinkIsAPartOfThePath) {
     EXPECT_EQ(status(get(link + "/anna/" + list.segments.at(0).uri)), 200);
     const auto named = "/hls/" + link_segment(link_query(keys, "hls/anna", later, "5f0c1e9a"));
     EXPECT_EQ(status(get(named + "/anna/stream.m3u8")), 200);
+}
+
+TEST_F(SegmentsServerTest, ALinkToALadderIsOfItsRungs) {
+    auto rung = *hub.publish(
+        "clara~1", [] {}, Hub::Clock::now());
+    for (const auto& packet : {live_header(1), live_intra(0), live_intra(30), live_intra(60)})
+        static_cast<void>(hub.receive_packet(rung, write_packet(packet), Hub::Clock::now()));
+    options.admission.link_keys = (root / "keys.json").string();
+    ASSERT_TRUE(add_link_key(options.admission.link_keys));
+    start();
+    const auto keys = read_link_keys(options.admission.link_keys).value();
+    const auto later = std::chrono::system_clock::now() + std::chrono::hours(1);
+    const auto link = "/hls/" + link_segment(link_query(keys, "hls/clara", later));
+    const auto answer = get(link + "/clara/master.m3u8");
+    EXPECT_EQ(status(answer), 200);
+    EXPECT_EQ(header(answer, "Cache-Control"), "public, max-age=1");
+    EXPECT_EQ(header(answer, "Content-Type"), "application/vnd.apple.mpegurl");
+    EXPECT_EQ(read_variants(body(answer)).at(0).uri, "../clara~1/stream.m3u8");
+    EXPECT_EQ(status(get(link + "/clara~1/stream.m3u8")), 200);
+    EXPECT_EQ(status(get(link + "/clara~1/check")), 200);
+    EXPECT_EQ(status(get(link + "/anna/stream.m3u8")), 403);
+    EXPECT_EQ(status(get("/hls/clara/master.m3u8")), 403);
+    EXPECT_TRUE(metrics_come_to("htvm_segments_requests_total{answer=\"master_200\"} 1"));
 }
 
 TEST_F(SegmentsServerTest, AreAskedForAsWatchingIs) {

@@ -42,6 +42,7 @@ for (const [what, more, rung, reason] of [
     ['the line bears far more than the next rung, if only once: it rises by one', { current: 0, bitsPerSecond: [0.4 * mega, 4 * mega] }, 1, /4\.0 Mbit\/s/],
     ['from the lowest it may rise by two', { current: 0, bitsPerSecond: [4 * mega, 4 * mega] }, 2, /4\.0 Mbit\/s/],
     ['the last segment came too slowly: it falls at once', { current: 2, bitsPerSecond: [4 * mega, 0.4 * mega] }, 0, /0\.4 Mbit\/s/],
+    ['it came too slowly, and hardly anything is ahead: it falls to the lowest', { current: 2, bitsPerSecond: [4 * mega, 1.2 * mega], aheadSeconds: 0.5 }, 0, /1\.2 Mbit\/s/],
     ['the line bears not even the lowest: the lowest', { current: 2, bitsPerSecond: [0.1 * mega] }, 0, /0\.1 Mbit\/s/],
     ['a rate a little above the line is kept to until it falls short', { current: 1, bitsPerSecond: [0.9 * mega] }, 1, /0\.9 Mbit\/s/],
     ['too little is ahead: it does not rise', { bitsPerSecond: [4 * mega, 4 * mega], aheadSeconds: 0.3 }, 1, /too little is ahead/],

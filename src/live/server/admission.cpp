@@ -154,7 +154,7 @@ std::optional<WebTokenCheck> Admission::check_token(std::string_view token, cons
                                                     std::string_view stream) const {
     if (!credentials_.web_token_keys || !looks_like_web_token(token)) return std::nullopt;
     return check_web_token(*credentials_.web_token_keys, credentials_.revoked, token,
-                           {.action = action, .stream = stream, .audience = options_.web_token_audience},
+                           {.action = action, .stream = ladder_of(stream), .audience = options_.web_token_audience},
                            std::chrono::system_clock::now());
 }
 
@@ -169,7 +169,7 @@ std::optional<Refusal> Admission::refuse_publishing(const Request& request, cons
         return Refusal{"token", "this hub knows no publishers: only programs on its own machine may publish"};
     }
     const auto token = shown_token(request);
-    if (credentials_.publishers && !token.empty() && may_publish(*credentials_.publishers, stream, token))
+    if (credentials_.publishers && !token.empty() && may_publish(*credentials_.publishers, ladder_of(stream), token))
         return std::nullopt;
     const auto check = web_tokens ? check_token(token, "publish", stream) : std::nullopt;
     if (check == WebTokenCheck::good) return std::nullopt;
@@ -186,12 +186,12 @@ std::optional<Refusal> Admission::refuse_publishing(const Request& request, cons
 std::optional<Refusal> Admission::refuse_watching(const Request& request, const std::string& stream,
                                                   bool socket) const {
     if (socket && !origin_allowed(request)) return Refusal{"origin", "pages of this site may not watch here"};
-    return refuse_without_token(request, stream, refuse_path("watch/" + stream, request));
+    return refuse_without_token(request, stream, refuse_path("watch/" + std::string(ladder_of(stream)), request));
 }
 
 std::optional<Refusal> Admission::refuse_segments(const Request& request, const std::string& stream,
                                                   std::string_view link) const {
-    return refuse_without_token(request, stream, refuse_link("hls/" + stream, link));
+    return refuse_without_token(request, stream, refuse_link("hls/" + std::string(ladder_of(stream)), link));
 }
 
 std::optional<Refusal> Admission::refuse_without_token(const Request& request, const std::string& stream,

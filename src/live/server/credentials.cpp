@@ -134,6 +134,8 @@ Result<Publishers> read_publishers(const std::string& path) {
 
 Result<std::string> add_publisher(const std::string& path, const std::string& name) {
     if (!is_stream_name(name)) return fail(ErrorKind::bad_input, stream_name_rule);
+    if (const std::string ladder(ladder_of(name)); ladder != name)
+        return fail(ErrorKind::bad_input, name + " is a rung of " + ladder + ", whose token is for all rungs");
     Publishers publishers;
     if (exists(path)) {
         auto known = read_publishers(path);

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "live/client/control.h"
+#include "live/hub/stream_name.h"
 #include "live/server/live_connection.h"
 #include "live/server/metrics.h"
 #include "live/server/segment_handler.h"
@@ -207,7 +208,7 @@ constexpr std::chrono::milliseconds between_texts{20}, between_walks{500};
 
 net::awaitable<std::optional<Refusal>> ask_authority(const Site& site, const char* action, const std::string& stream,
                                                      const Request& request, const Client& client, Refusal otherwise) {
-    Question question{action, stream, client.address.to_string(), shown_token(request)};
+    Question question{action, std::string(ladder_of(stream)), client.address.to_string(), shown_token(request)};
     const auto answer = co_await site.authority->ask(std::move(question));
     if (answer == Answer::yes) co_return std::nullopt;
     otherwise.cause = answer == Answer::no ? "authority" : "authority_silent";

@@ -12,8 +12,10 @@
 #include <utility>
 #include <vector>
 
+#include "codec/format/sequence.h"
 #include "container/fragment.h"
 #include "container/playlist.h"
+#include "live/hub/stream_name.h"
 
 namespace htvm::live {
 
@@ -78,6 +80,9 @@ struct Piece {
 struct Segment {
     std::uint64_t number = 0;
     PlaylistSegment entry;  // with all its parts
+    // Of its first frame, as the session's packets say: what the rungs of a ladder have in common.
+    std::uint64_t session = 0;  // 0: unknown
+    std::int64_t timestamp_us = 0;
 };
 
 // One stream is shown so. Whatever is in `files` can be asked for; the lists say what is in the playlist.
@@ -89,6 +94,8 @@ struct Shown {
     std::deque<Segment> leaving;        // no longer listed, but who has the last playlist may still ask for them
     std::optional<Segment> open;        // of which not all parts have come
     std::uint64_t next_number = 0;      // of the segment that begins next
+    bool begun = false;                 // there was a segment
+    double frames_per_second = 0;       // 0: not known
     std::uint64_t discontinuities = 0;  // before the first one listed
     double longest = 0;                 // seconds of a segment
     std::size_t bytes = 0;              // of whole segments and their maps
@@ -149,6 +156,7 @@ namespace {
 struct Work {
     HubMemory::SharedShare share;
     SharedPacket header{};                       // of the session
+    std::uint64_t session = 0;                   // 0: unknown
     std::vector<SharedPacket> before{};          // codebooks since the last frame, while there is no segmenter
     std::optional<StreamSegmenter> segmenter{};  // none: it begins with a frame that can be decoded by itself
     std::size_t held = 0;                        // bytes of it that the share counts
@@ -175,6 +183,32 @@ bool same_bytes(const SharedPacket& a, const SharedPacket& b) {
            std::equal(a->bytes.begin() + packet_header_bytes, a->bytes.end(), b->bytes.begin() + packet_header_bytes);
 }
 
+// Timestamps may be anything: what is too much for a number of 64 bits wraps.
+std::int64_t sum_of(std::int64_t a, std::int64_t b) {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
+}
+std::int64_t difference_of(std::int64_t a, std::int64_t b) {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
+}
+
+// Rounds down.
+std::int64_t divided(std::int64_t value, std::int64_t by) { return value / by - (value % by < 0 ? 1 : 0); }
+
+std::int64_t microseconds(double seconds) { return static_cast<std::int64_t>(seconds * 1e6); }
+
+// Streams of a ladder are cut at multiples of a segment's length by the publisher's clock, which they have in common.
+SegmentCuts cuts_of(const LiveSegmentOptions& options, bool of_ladder, std::int64_t first_us) {
+    const auto length = microseconds(options.seconds);
+    if (of_ladder)
+        return {.seconds = options.seconds,
+                .part_seconds = options.part_seconds,
+                .on_grid = true,
+                .grid_us = -((first_us % length + length) % length)};
+    // Cameras come a little early now and then, and a segment is not to wait for the next access point for that.
+    constexpr double early = 0.05;
+    return {.seconds = (1 - early) * options.seconds, .part_seconds = options.part_seconds};
+}
+
 bool begins_alone(const PacketHeader& header) {
     return header.kind == PacketKind::intra && header.has(packet_flag::referred);
 }
@@ -198,6 +232,7 @@ struct LiveSegments::State {
 
     void take(const std::string& name, const SharedPacket& packet, Clock::time_point now);
     void push(const std::string& name, Work& work, const SharedPacket& packet, Clock::time_point now);
+    void read_header(const std::string& name, Work& work);
     void check(const std::string& name, Work& work, Clock::time_point now);
     void finish(const std::string& name, Work& work);
     void lose(const std::string& name, Work& work);
@@ -205,12 +240,14 @@ struct LiveSegments::State {
     void gave_way(const std::string& name);
     void show_what_stands_still(Clock::time_point now);
     void show(const std::string& name, Work& work, StreamSegment segment);
-    void begin_segment(Shown& shown, Work& work, const StreamSegment& segment);
+    void begin_segment(const std::string& name, Shown& shown, Work& work, const StreamSegment& segment);
+    const Segment* same_of_ladder(const std::string& name, const Segment& segment) const;
     void close_segment(Shown& shown, const Work& work);
     void keep_window(Shown& shown) const;
     void wake(const std::string& name);
     void count_held(Work& work) const;
     void make_text(Shown& shown) const;
+    PlaylistVariant variant_of(const Shown& shown) const;
     std::string hint(const Shown& shown) const;
     bool has(const Shown& shown, const Position& position) const;
     Found wait(Shown& shown, const Wake& wake);
@@ -236,16 +273,14 @@ void LiveSegments::State::take(const std::string& name, const SharedPacket& pack
         // Another session: its times begin anew, and so do all tables.
         finish(name, work);
         work.header = packet;
+        read_header(name, work);
         work.before.clear();
         return;
     }
     if (work.segmenter) return push(name, work, packet, now);
     if (!work.header) return;
     if (begins_alone(packet->header)) {
-        // Cameras come a little early now and then, and a segment is not to wait for the next access point for that.
-        constexpr double early = 0.05;
-        work.segmenter.emplace(
-            SegmentCuts{.seconds = (1 - early) * options.seconds, .part_seconds = options.part_seconds});
+        work.segmenter.emplace(cuts_of(options, ladder_of(name) != name, packet->header.timestamp_us));
         work.segment_begun = now;
         work.arrivals.clear();
         work.first_us.reset();
@@ -265,6 +300,16 @@ void LiveSegments::State::take(const std::string& name, const SharedPacket& pack
     }
 }
 
+void LiveSegments::State::read_header(const std::string& name, Work& work) {
+    const std::span<const std::uint8_t> message(work.header->bytes);
+    const auto header =
+        internal::read_sequence_header(message.subspan(packet_header_bytes, message.size() - packet_overhead));
+    work.session = header ? header->session : 0;
+    const std::lock_guard lock(mutex);
+    streams[name].frames_per_second =
+        header ? static_cast<double>(header->fps_numerator) / std::max<double>(header->fps_denominator, 1) : 0;
+}
+
 void LiveSegments::State::push(const std::string& name, Work& work, const SharedPacket& packet, Clock::time_point now) {
     if (!work.segmenter) return;
     work.heard = now;
@@ -272,7 +317,7 @@ void LiveSegments::State::push(const std::string& name, Work& work, const Shared
         if (!work.first_us) work.first_us = packet->header.timestamp_us;
         constexpr std::size_t most_arrivals = 65536;
         if (work.arrivals.size() < most_arrivals)
-            work.arrivals.push_back({packet->header.timestamp_us - *work.first_us, unix_ms()});
+            work.arrivals.push_back({difference_of(packet->header.timestamp_us, *work.first_us), unix_ms()});
     }
     const auto room = [&] { return hub.make_room(*work.share, 2 * packet->bytes.size(), now); };
     if (!room()) return lose(name, work);
@@ -381,7 +426,7 @@ void LiveSegments::State::show(const std::string& name, Work& work, StreamSegmen
         auto& shown = streams[name];
         if (segment.begins) {
             close_segment(shown, work);
-            begin_segment(shown, work, segment);
+            begin_segment(name, shown, work, segment);
         }
         // What goes on with a segment that was given up.
         if (!shown.open) return;
@@ -401,13 +446,42 @@ void LiveSegments::State::show(const std::string& name, Work& work, StreamSegmen
     wake(name);
 }
 
-void LiveSegments::State::begin_segment(Shown& shown, Work& work, const StreamSegment& segment) {
+// The segment of another rung with frames of the same time, if there is one: numbers and dates follow it.
+const Segment* LiveSegments::State::same_of_ladder(const std::string& name, const Segment& segment) const {
+    const std::string ladder(ladder_of(name));
+    if (ladder == name || segment.session == 0) return nullptr;
+    const auto length = microseconds(options.seconds);
+    const auto is_same = [&](const Segment& other) {
+        return other.session == segment.session &&
+               divided(other.timestamp_us, length) == divided(segment.timestamp_us, length);
+    };
+    for (std::size_t number = 1; number <= most_live_rungs; ++number) {
+        const auto found = streams.find(rung_name(ladder, number));
+        if (found == streams.end() || found->first == name) continue;
+        const auto& other = found->second;
+        if (other.open && is_same(*other.open)) return &*other.open;
+        for (const auto* list : {&other.listed, &other.leaving})
+            for (auto one = list->rbegin(); one != list->rend(); ++one)
+                if (is_same(*one)) return &*one;
+    }
+    return nullptr;
+}
+
+void LiveSegments::State::begin_segment(const std::string& name, Shown& shown, Work& work,
+                                        const StreamSegment& segment) {
     Segment next;
+    next.session = work.session;
+    next.timestamp_us = sum_of(work.first_us.value_or(0), segment.begin_us);
+    const auto* same = same_of_ladder(name, next);
+    const bool listed = !shown.listed.empty() || !shown.leaving.empty();
+    if (same && !listed && (!shown.begun || same->number > shown.next_number)) shown.next_number = same->number;
+    shown.begun = true;
     next.number = shown.next_number;
     const auto map = text_of(segment.map);
     next.entry.map_uri = "map-" + name_of(map) + ".mp4";
     next.entry.discontinuity = std::exchange(work.discontinuity, false);
     next.entry.unix_ms = came_at(work, segment.begin_us);
+    if (same) next.entry.unix_ms = same->entry.unix_ms + difference_of(next.timestamp_us, same->timestamp_us) / 1000;
     if (++shown.uses_of_map[next.entry.map_uri] == 1) {
         const auto bytes = counted(map, work.share);
         shown.files[next.entry.map_uri] = {bytes, *bytes};
@@ -476,6 +550,7 @@ void LiveSegments::State::make_text(Shown& shown) const {
     list.first_discontinuity = shown.discontinuities;
     list.target_seconds = std::max(shown.longest, options.seconds);
     list.has_end = shown.ended.has_value();
+    list.waits = !list.has_end;
     for (const auto& segment : shown.listed) list.segments.push_back(segment.entry);
     // Parts are for who is near the end.
     double behind = 0;
@@ -493,6 +568,29 @@ void LiveSegments::State::make_text(Shown& shown) const {
     auto text = write_playlist(list);
     shown.tag = '"' + name_of(text) + '"';
     shown.text = std::make_shared<const std::string>(std::move(text));
+}
+
+// What a list of playlists says of it, by the segments that are listed.
+PlaylistVariant LiveSegments::State::variant_of(const Shown& shown) const {
+    PlaylistVariant out;
+    double bits = 0, seconds = 0, most = 0;
+    for (const auto& segment : shown.listed) {
+        const auto& entry = segment.entry;
+        const auto of_segment = 8.0 * static_cast<double>(shown.files.at(entry.uri).content.size());
+        bits += of_segment;
+        seconds += entry.seconds;
+        most = std::max(most, of_segment / std::max(entry.seconds, 0.1));
+    }
+    out.bits_per_second = static_cast<std::uint64_t>(std::ceil(most));
+    out.average = static_cast<std::uint64_t>(std::ceil(bits / std::max(seconds, 0.1)));
+    out.frames_per_second = shown.frames_per_second;
+    const auto content = shown.files.at(shown.listed.back().entry.map_uri).content;
+    const std::span map(reinterpret_cast<const std::uint8_t*>(content.data()), content.size());
+    out.codecs = codecs_of(map);
+    const auto pictures = picture_size_of(map);
+    out.width = pictures.width;
+    out.height = pictures.height;
+    return out;
 }
 
 // ---- What is asked for ----------------------------------------------------------------------------------------------
@@ -557,6 +655,30 @@ Found LiveSegments::playlist(const std::string& stream, const std::optional<Posi
     }
     if (!shown.text) state.make_text(shown);
     return {.state = Found::State::there, .bytes = shown.text, .content = *shown.text, .tag = shown.tag};
+}
+
+Found LiveSegments::ladder(const std::string& name, bool patient, const Wake& wake) {
+    if (ladder_of(name) != name) return {};
+    auto& state = *state_;
+    const std::lock_guard lock(state.mutex);
+    std::vector<PlaylistVariant> variants;
+    Shown* awaited = nullptr;
+    for (std::size_t number = 0; number <= most_live_rungs; ++number) {
+        const auto rung = number == 0 ? name : rung_name(name, number);
+        const auto found = state.streams.find(rung);
+        if (found == state.streams.end()) continue;
+        auto& shown = found->second;
+        if (!shown.listed.empty()) {
+            variants.push_back(state.variant_of(shown));
+            variants.back().uri = (number == 0 ? "" : "../" + rung + '/') + std::string("stream.m3u8");
+        } else if (!shown.ended) {
+            awaited = &shown;
+        }
+    }
+    if (awaited && (patient || variants.empty())) return state.wait(*awaited, wake);
+    if (variants.empty()) return {};
+    const auto text = std::make_shared<const std::string>(write_variants(variants));
+    return {.state = Found::State::there, .bytes = text, .content = *text, .tag = '"' + name_of(*text) + '"'};
 }
 
 Found LiveSegments::file(const std::string& stream, const std::string& name, const Wake& wake) {

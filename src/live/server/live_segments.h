@@ -2,6 +2,9 @@
 // thousands watch is asked for once by each cache. The packets that go to viewers are cut where players can start; a
 // window of segments is kept, and with parts what has come of the newest one, too.
 //
+// The rungs of a ladder (stream_name.h) that one encoder publishes are cut at the same times, and their segments of the
+// same frames have the same numbers and dates, so that players go from one to another.
+//
 // Names of segments and maps are made of their contents, so they never mean other bytes. Numbers of segments begin with
 // the time, so they ascend although the hub is started anew. What is held counts as the stream's memory in the hub, and
 // goes where the stream gives way.
@@ -75,6 +78,9 @@ public:
         std::optional<std::uint64_t> part{};
     };
     Found playlist(const std::string& stream, const std::optional<Position>& position, const Wake& wake);
+    // The list of the playlists of a ladder's rungs, the streams NAME~1 to NAME~8, and of the stream NAME itself, as
+    // far as they are there. patient: while one of them has no segment yet, that is waited for.
+    Found ladder(const std::string& name, bool patient, const Wake& wake);
     // A map, a segment or a part.
     Found file(const std::string& stream, const std::string& name, const Wake& wake);
 

@@ -21,6 +21,7 @@ namespace http = boost::beast::http;
 
 constexpr auto awaited = net::as_tuple(net::use_awaitable);
 constexpr const char* playlist_name = "stream.m3u8";
+constexpr const char* ladder_name = "master.m3u8";
 
 struct Asked {
     std::string link{};  // as a target with a query
@@ -52,9 +53,10 @@ Wanted wanted_by(const Request& request) {
 net::awaitable<LiveSegments::Found> find(LiveSegments& segments, const Asked& asked,
                                          const std::optional<LiveSegments::Position>& position) {
     const auto timer = std::make_shared<net::steady_timer>(co_await net::this_coro::executor);
-    const auto look = [&] {
+    const auto look = [&](bool patient = true) {
         // It may come late, when nobody waits any more, and on another thread.
         const auto wake = [timer] { net::post(timer->get_executor(), [timer] { timer->cancel(); }); };
+        if (asked.file == ladder_name) return segments.ladder(asked.stream, patient, wake);
         return asked.file == playlist_name ? segments.playlist(asked.stream, position, wake)
                                            : segments.file(asked.stream, asked.file, wake);
     };
@@ -68,7 +70,8 @@ net::awaitable<LiveSegments::Found> find(LiveSegments& segments, const Asked& as
         found.waiting.reset();
         found = look();
     }
-    co_return found;
+    // Of a ladder's rungs one may never come.
+    co_return found.state == LiveSegments::Found::State::waits ? look(false) : found;
 }
 
 // For those for whom nothing is there: caches ask again soon.
@@ -126,8 +129,8 @@ Response refused_response(LiveSegments::Found::State state, ResponseHeader heade
 
 net::awaitable<Response> answer_asked(const Site& site, const Asked& asked, const Request& request,
                                       ResponseHeader header) {
-    const bool list = asked.file == playlist_name;
-    const auto wanted = list ? wanted_by(request) : Wanted{};
+    const bool list = asked.file == playlist_name || asked.file == ladder_name;
+    const auto wanted = asked.file == playlist_name ? wanted_by(request) : Wanted{};
     if (!wanted.good) co_return empty_response(http::status::bad_request, std::move(header));
     auto found = co_await find(*site.segments, asked, wanted.position);
     if (found.state != LiveSegments::Found::State::there) co_return refused_response(found.state, std::move(header));
@@ -160,7 +163,7 @@ net::awaitable<Response> answer_segments(const Site& site, const std::vector<std
     if (auto kept = std::string(response.header[http::field::cache_control]);
         site.admission.guards_watching() && kept.starts_with("public"))
         response.header.set(http::field::cache_control, "private" + kept.substr(6));
-    const auto kind = asked->file == playlist_name ? "playlist_" : "file_";
+    const auto* kind = asked->file == playlist_name ? "playlist_" : asked->file == ladder_name ? "master_" : "file_";
     ++site.traffic.segment_requests[kind + std::to_string(response.header.result_int())];
     if (request.method() != http::verb::head) site.traffic.segment_bytes += response.content.size();
     co_return response;

@@ -1,6 +1,7 @@
 // Answers requests for the segments of live streams, below /hls/:
 //
 //   NAME/stream.m3u8         the playlist; ?_HLS_msn=N&_HLS_part=P waits until it has that (HLS, second edition)
+//   NAME/master.m3u8         the list of the playlists of a ladder's rungs, NAME~1 to NAME~8, and of NAME itself
 //   NAME/map-HASH.mp4        what is needed before a segment
 //   NAME/NUMBER-HASH.m4s     a segment, and, with parts, NUMBER-TAG.PART.m4s, which waits if it is the one that is next
 //   LINK/NAME/...            the same where links are asked for: LINK is link_segment() (credentials.h) of hls/NAME

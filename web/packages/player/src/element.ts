@@ -424,6 +424,8 @@ export class HtvmPlayerElement extends HTMLElement {
         const picture = this.#playback.takePicture();
         this.#display.setFrame(frame, picture, this.#playback.hasPicture);
         if (this.#shownFrames++ === 0) this.#overlay.poster.hidden = true;
+        // By now the first ones were drawn, which takes longer than all later ones.
+        if (this.#shownFrames === 3) this.#playback.joinAnew();
         this.#statistics.add(frame, now, picture);
         this.#undrawn = frame;
         const { panel } = this.#overlay;

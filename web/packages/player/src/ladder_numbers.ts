@@ -17,19 +17,23 @@ export interface LadderNumbers {
     lostSegments: number;
     /** Whether segments are still being added. */
     live: boolean;
+    /** How long ago the frame that is shown came to the hub, by the dates in its playlist and this machine's clock; null where a
+     * stream is over, or its playlist has no dates. */
+    secondsBehind: number | null;
 }
 
 /** What is told of a stream in segments. */
 export function ladderNumbers({ ladder, current }: { ladder: LadderReport | null; current: FrameReport | null }): LadderNumbers | null {
     if (!ladder) return null;
-    const { rungs, rung, reason, lineMegabitsPerSecond, secondsFetched, lostSegments, live } = ladder;
-    return { rungs, shown: current?.rung ?? null, fetched: rung, reason, lineMegabitsPerSecond, secondsFetched, lostSegments, live };
+    const { rungs, rung, reason, lineMegabitsPerSecond, secondsFetched, lostSegments, live, zeroMs } = ladder;
+    const secondsBehind = live && zeroMs !== null && current ? (Date.now() - zeroMs - current.timeUs / 1000) / 1000 : null;
+    return { rungs, shown: current?.rung ?? null, fetched: rung, reason, lineMegabitsPerSecond, secondsFetched, lostSegments, live, secondsBehind };
 }
 
 /** For the panel. */
 export function ladderLines(ladder: LadderNumbers | null): string[] {
     if (!ladder) return [];
-    const { rungs, shown, fetched, reason, lineMegabitsPerSecond, secondsFetched, lostSegments } = ladder;
+    const { rungs, shown, fetched, reason, lineMegabitsPerSecond, secondsFetched, lostSegments, secondsBehind } = ladder;
     const name = (rung: number | null): string => {
         const { megabitsPerSecond = 0, resolution = '' } = rungs[rung ?? fetched] ?? {};
         return `${(rung ?? fetched) + 1} of ${rungs.length}: ${megabitsPerSecond.toFixed(2)} Mbit/s${resolution ? `, ${resolution}` : ''}`;
@@ -38,6 +42,7 @@ export function ladderLines(ladder: LadderNumbers | null): string[] {
     return [
         ...(rungs.length > 1 ? [`rung     ${name(shown)}`, `next     ${name(fetched)}; ${reason}`] : []),
         `line     ${line}, ${secondsFetched.toFixed(1)} s fetched`,
+        ...(secondsBehind !== null ? [`behind   ${secondsBehind.toFixed(1)} s behind the hub`] : []),
         ...(lostSegments > 0 ? [`lost     ${lostSegments} ${lostSegments === 1 ? 'segment' : 'segments'}`] : []),
     ];
 }

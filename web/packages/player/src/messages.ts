@@ -66,6 +66,10 @@ export interface LadderReport {
     lostSegments: number;
     /** Whether segments are still being added. */
     live: boolean;
+    /** Where in a live stream one joins now: media time, microseconds. */
+    joinUs: number;
+    /** When the frame of media time 0 was made, milliseconds since 1970; null: the playlist does not tell. */
+    zeroMs: number | null;
 }
 
 export type FailureCode = 'missing' | 'network' | 'refused' | 'not-htvm' | 'empty' | 'version' | 'decoder' | 'changed';

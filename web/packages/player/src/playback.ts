@@ -38,6 +38,7 @@ const timelines: Record<SourceKind, new (playback: TimedPlayback) => Timeline> =
 const leastFrames = 3; // that there must be room for
 const mostBytes = 96 << 20; // that frames may take beyond these
 const mostTraps = 3;
+const joinedLateUs = 1e6; // who joins later than that joins once more
 const texturedFrom = 6; // version of streams whose frames have pictures
 
 export class Playback implements TimedPlayback {
@@ -60,6 +61,7 @@ export class Playback implements TimedPlayback {
     #wasmUrl: string;
     #url = '';
     #serial = 0;
+    #openedSerial = 0; // nobody has sought anything since the stream was opened
     #endedSerial = -1;
     #finished = false; // played to the end
     #room = leastFrames;
@@ -200,6 +202,12 @@ export class Playback implements TimedPlayback {
         this.goTo(Math.max(0, timeUs));
     }
 
+    /** Near the end of a live playlist once more, where what it took to show the first frames was time lost. */
+    joinAnew(): void {
+        if (this.#serial !== this.#openedSerial || !this.playing || !this.ladder?.live) return;
+        if (this.ladder.joinUs - this.timeUs > joinedLateUs) this.seek(this.ladder.joinUs);
+    }
+
     /** By frames, from the one shown; paused. */
     step(frames: number): void {
         this.pause();
@@ -326,6 +334,7 @@ export class Playback implements TimedPlayback {
         this.soughtUs = timeUs;
         this.awaiting = true;
         const serial = ++this.#serial;
+        this.#openedSerial = serial;
         this.#timeline.standAt(timeUs);
         this.#listener.jumped();
         void this.#worker.start(() => {

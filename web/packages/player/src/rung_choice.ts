@@ -36,7 +36,8 @@ export function chooseRung(state: LineState): RungChoice {
     if (current === null || newest === undefined) return { rung: current ?? 0, reason: 'it begins low' };
     const line = `the line brings ${(newest / 1e6).toFixed(1)} Mbit/s`;
     if (rungs[current]! > shareToStay * newest) {
-        const below = Math.max(highest(rungs, shareToStay * newest), 0);
+        // What is ahead does not last for another segment that comes too slowly, and the line may have become slower still.
+        const below = aheadSeconds < segmentSeconds ? 0 : Math.max(highest(rungs, shareToStay * newest), 0);
         if (below < current) return { rung: below, reason: line };
     }
     if (decodeShare > decodingTooLong && current > 0) return { rung: current - 1, reason: 'decoding takes too long' };

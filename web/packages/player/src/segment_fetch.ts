@@ -3,10 +3,10 @@ import { SourceError } from './byte_source.js';
 
 const retriesMs = [250, 750, 2000];
 const mostBytes = 1 << 26;
-const lookEveryMs = 200;
+const lookEveryMs = 100;
 const rateOverMs = 600; // what the line brings now is measured over so long
-const leastRest = 8192; // bytes behind the first ones, by which alone the line is measured
-const leastMs = 400; // of a transfer, before it can be given up
+const leastMs = 300; // of a transfer, before it can be given up,
+const leastSilentMs = 1000; // or of an answer that has not begun: a cache may be waiting for it
 
 /** How a transfer goes: bytes that have come, all that will (null: not told), and bits a second now. */
 export interface Progress {
@@ -16,24 +16,32 @@ export interface Progress {
 }
 
 export type Fetched =
-    | { outcome: 'here'; bytes: Uint8Array; bitsPerSecond: number; url: string }
+    /** ms: from the beginning of the answer to its end. What was before is the way there and back, and the server's own time. */
+    | { outcome: 'here'; bytes: Uint8Array; ms: number; url: string }
     /** The server does not have it. */
     | { outcome: 'gone' }
     | { outcome: 'given up'; bitsPerSecond: number };
 
-/**
- * The file. Throws where no connection comes about, again and again, and where the signal aborts. giveUp: asked now and then
- * whether to go on.
- */
-export async function fetchFile(url: string, signal: AbortSignal, giveUp?: (progress: Progress) => boolean, fresh = false): Promise<Fetched> {
+export interface FetchOptions {
+    /** Asked now and then whether to go on. */
+    giveUp?: (progress: Progress) => boolean;
+    /** The browser's own copy is not enough. */
+    fresh?: boolean;
+    /** Whether to try again where the server fails or no connection comes about. */
+    again?: boolean;
+}
+
+/** The file. Throws where no connection comes about, and where the signal aborts. */
+export async function fetchFile(url: string, signal: AbortSignal, { giveUp, fresh = false, again = true }: FetchOptions = {}): Promise<Fetched> {
+    const retries = again ? retriesMs.length : 0;
     for (let attempt = 0; ; ++attempt) {
         try {
             const fetched = await tryToFetch(url, signal, giveUp, fresh);
             if (fetched) return fetched;
-            if (attempt >= retriesMs.length) return { outcome: 'gone' };
+            if (attempt >= retries) return { outcome: 'gone' };
         } catch (error) {
             if (signal.aborted) throw error;
-            if (attempt >= retriesMs.length)
+            if (attempt >= retries)
                 throw new SourceError('network', `${url} could not be read: the connection failed, or the server does not allow pages of other sites to read it (CORS).`);
         }
         await new Promise((resolve) => setTimeout(resolve, retriesMs[attempt]));
@@ -48,6 +56,7 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
     const stop = (): void => abort.abort();
     signal.addEventListener('abort', stop);
     let [bytes, total, givenUp] = [0, null as number | null, 0];
+    let begun: number | null = null; // when the answer did
     const marks: { at: number; bytes: number }[] = [{ at: begin, bytes: 0 }];
     const rate = (): number => {
         const now = performance.now();
@@ -57,23 +66,23 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
     const look = setInterval(() => {
         const bitsPerSecond = rate();
         marks.push({ at: performance.now(), bytes });
-        if (performance.now() - begin < leastMs || !giveUp?.({ bytes, total, bitsPerSecond })) return;
+        if (performance.now() - begin < (begun === null ? leastSilentMs : leastMs) || !giveUp?.({ bytes, total, bitsPerSecond })) return;
         givenUp = Math.max(bitsPerSecond, 1);
         abort.abort();
     }, lookEveryMs);
     try {
         const response = await fetch(url, { signal: abort.signal, cache: fresh ? 'no-cache' : 'default' });
+        begun = performance.now();
+        marks.splice(0, marks.length, { at: begun, bytes: 0 });
         if (response.status === 404 || response.status === 410) return { outcome: 'gone' };
         if (!response.ok) return null;
         const length = Number(response.headers.get('Content-Length') ?? NaN);
         if (length > 0 && !response.headers.get('Content-Encoding')) total = length;
         const parts: Uint8Array[] = [];
-        let first = { at: performance.now(), bytes: 0 }; // until then much of the time is the way there and back
         const reader = response.body!.getReader();
         for (;;) {
             const { done, value } = await reader.read();
             if (done) break;
-            if (bytes === 0) first = { at: performance.now(), bytes: value.length };
             bytes += value.length;
             if (bytes > mostBytes) {
                 abort.abort();
@@ -87,11 +96,7 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
             whole.set(part, at);
             at += part.length;
         }
-        const end = performance.now();
-        const ofAll = (8000 * bytes) / Math.max(end - begin, 1);
-        const rest = bytes - first.bytes;
-        const ofRest = rest < leastRest ? 0 : (8000 * rest) / Math.max(end - first.at, 1);
-        return { outcome: 'here', bytes: whole, bitsPerSecond: Math.max(ofAll, ofRest), url: response.url || url };
+        return { outcome: 'here', bytes: whole, ms: performance.now() - begun, url: response.url || url };
     } catch (error) {
         if (givenUp > 0) return { outcome: 'given up', bitsPerSecond: givenUp };
         throw error;

@@ -1,38 +1,44 @@
 // The segments of a playlist (docs/mp4.md) as the packets of their stream: some seconds are fetched ahead, each segment in the
 // rung that the line bears then (rung_choice.ts). Where another rung begins, as after a seek, what its first frame needs comes
-// before, as packets that are passed: so the next frame shown is the new rung's.
+// before, as packets that are passed: so the next frame shown is the new rung's. Near the end of a live stream that has parts,
+// a segment is fetched part by part, while it is made.
 import { packetKind, type Packet } from '@htvm/decoder';
 import { Interrupted, SourceError } from './byte_source.js';
 import type { LadderReport } from './messages.js';
 import { timed } from './mp4_packets.js';
 import { SampleReader } from './mp4_samples.js';
 import { boxesOf, Fields, readFragment, readMovie, Samples, type Movie } from './mp4_tables.js';
-import type { Segment } from './playlist.js';
 import { chooseRung, shouldGiveUp, type RungChoice } from './rung_choice.js';
 import { fetchFile, type Fetched, type Progress } from './segment_fetch.js';
-import { SegmentLists } from './segment_list.js';
+import { SegmentLists, type Piece, type Position } from './segment_list.js';
 import type { Place, StreamPackets, TimedPacket } from './stream_packets.js';
 
 const aheadSeconds = 4; // are fetched before they are decoded
 const keptToRise = 1.5; // seconds of a lower rung that are kept where the line brings much more
 const muchMore = 2;
 const ratesKept = 4;
+const leastBits = 8 * 16384; // that tell what the line brings,
+const mostMs = 400; // or fewer that took so long
+const shareForLists = 0.2; // of what the line brings
+const surelyBackwards = 3; // lists in a row that end before what comes next
 const mapsKept = 8;
 const mostUnreachable = 3; // segments in a row that do not come, before the stream counts as unreachable
 const freshenMs = 150; // a cache's first answer may be as old as its last viewer's: so soon the list is read again
 const gapUs = 100000; // from here on time between two segments is left out
 const mendedUs = 1e6; // by which a segment's own time may differ from the list's
 
-/** A segment that was fetched. */
+/** A segment that was fetched, or a part of one. */
 interface Loaded {
-    segment: Segment;
+    piece: Piece;
     rung: number;
     movie: Movie;
     reader: SampleReader;
     /** What its first frame needs; null where it follows the segment before. */
     needed: Packet[] | null;
-    /** It was said that parts of it are. */
+    /** It was said that some of it is damaged. */
     damaged: boolean;
+    /** What is before this time was shown in another rung. */
+    shownUs: number;
 }
 
 export class SegmentPackets implements StreamPackets {
@@ -46,10 +52,14 @@ export class SegmentPackets implements StreamPackets {
     #wakes: (() => void)[] = [];
     #opened = false;
     // What is fetched.
-    #nextNumber = 0;
+    #next: Position = { number: 0, part: 0 };
+    #fetchedUs = 0; // where what was fetched last ends
+    #shownUs = -Infinity; // of the segment that comes next, what is before this time was fetched in another rung
     #rung: number | null = null; // of the segment that was fetched last
     #tracks: Movie | null = null; // of the rung; null: its map is to be fetched
     #rates: number[] = [];
+    #came = { bits: 0, ms: 0 }; // since the last rate
+    #backwards = 0; // lists in a row that ended before what comes next
     #atMost = { number: -1, rung: 0 }; // of a segment that was given up in a higher rung
     #loaded: Loaded[] = [];
     #lost = 0; // segments, all or in part
@@ -92,10 +102,10 @@ export class SegmentPackets implements StreamPackets {
         const joins = !this.#opened && soughtUs === 0 && this.#lists.live;
         this.#opened = true;
         const rung = Math.min(this.#rung ?? 0, this.#lists.rungs.length - 1);
-        if (joins) await pause(freshenMs, signal);
-        if (!this.#lists.listOf(rung) || joins || (this.#lists.live && this.#lists.goodForMs(rung) === 0)) await this.#lists.read(rung, signal);
-        this.#nextNumber = this.#lists.numberAt(rung, joins ? null : soughtUs);
-        this.#tracks = null;
+        if (joins) await this.#freshen(rung, signal);
+        else if (!this.#lists.listOf(rung) || (this.#lists.live && this.#lists.goodForMs(rung) === 0)) await this.#lists.read(rung, signal);
+        const place = this.#lists.placeAt(rung, joins ? null : soughtUs);
+        this.#goTo(place.number);
         this.#loaded = [];
         this.#ready = [];
         this.#current = null;
@@ -103,8 +113,22 @@ export class SegmentPackets implements StreamPackets {
         this.#complete = false;
         this.#failure = null;
         void this.#fill(signal);
-        const beginUs = this.#lists.beginUs(this.#nextNumber);
-        return { header: null, timeUs: joins ? beginUs : Math.max(soughtUs, beginUs) };
+        return { header: null, timeUs: place.timeUs };
+    }
+
+    // What a cache answers first may be old.
+    async #freshen(rung: number, signal: AbortSignal): Promise<void> {
+        if (!this.#lists.listOf(rung)) await this.#lists.read(rung, signal);
+        if (this.#lists.waits(rung) && (await this.#lists.waitFor(rung, this.#lists.end(rung), true, signal))) return;
+        await pause(freshenMs, signal);
+        await this.#lists.read(rung, signal);
+    }
+
+    // What comes next begins with that segment.
+    #goTo(number: number): void {
+        this.#next = { number, part: 0 };
+        this.#shownUs = -Infinity;
+        this.#tracks = null;
     }
 
     async next(): Promise<TimedPacket | null> {
@@ -164,33 +188,34 @@ export class SegmentPackets implements StreamPackets {
         if (first) this.#begin(loaded, timeUs);
         const ownUs = timeUs + (this.#originUs ?? 0);
         const base = (baseUs ?? 0) - (this.#originUs ?? 0);
-        const { rung } = loaded;
+        const { rung, piece } = loaded;
+        const shown = ownUs < loaded.shownUs - this.frameUs / 2;
         if (first && loaded.needed)
             for (const packet of loaded.needed) {
                 const passed = packet.kind !== packetKind.sequence;
                 const neededUs = Math.min(packet.timestampUs - base, ownUs);
                 if (packet.kind !== packetKind.audio) this.#ready.push({ ...timed(packet, neededUs, base, passed), rung });
             }
-        for (const packet of packets) this.#ready.push({ ...timed(packet, ownUs, base, false), rung });
+        for (const packet of packets)
+            if (!shown || packet.kind !== packetKind.audio) this.#ready.push({ ...timed(packet, ownUs, base, shown), rung });
         if (!first) return;
-        const beginUs = this.#lists.beginUs(loaded.segment.number);
-        const skippedUs = this.#endUs === null ? 0 : beginUs - this.#endUs;
+        const skippedUs = this.#endUs === null ? 0 : piece.beginUs - this.#endUs;
         if (skippedUs > gapUs && this.#ready[0]) this.#ready[0].skippedUs = skippedUs;
-        this.#endUs = beginUs + loaded.segment.seconds * 1e6;
+        this.#endUs = piece.beginUs + piece.seconds * 1e6;
     }
 
     // Media time goes by the segments' own times, which are exact, unless they contradict the list.
-    #begin({ segment }: Loaded, timeUs: number): void {
-        const listedUs = this.#lists.beginUs(segment.number);
+    #begin({ piece }: Loaded, timeUs: number): void {
+        const listedUs = piece.beginUs;
         if (this.#originUs === null || Math.abs(timeUs + this.#originUs - listedUs) > mendedUs) this.#originUs = Math.round(listedUs - timeUs);
     }
 
     // ---- what is fetched ------------------------------------------------------------------------------------------------
 
     get #ahead(): number {
-        let seconds = this.#loaded.reduce((sum, { segment }) => sum + segment.seconds, 0);
+        let seconds = this.#loaded.reduce((sum, { piece }) => sum + piece.seconds, 0);
         const samples = this.#current?.movie.tracks.find(({ kind }) => kind === 'meshes')!.samples;
-        if (samples) seconds += this.#current!.segment.seconds * (1 - this.#sample / Math.max(samples.count, 1));
+        if (samples) seconds += this.#current!.piece.seconds * (1 - this.#sample / Math.max(samples.count, 1));
         return seconds;
     }
 
@@ -201,10 +226,10 @@ export class SegmentPackets implements StreamPackets {
                     await this.#woken();
                     continue;
                 }
-                const segment = await this.#chooseSegment(signal);
+                const piece = await this.#choosePiece(signal);
                 if (signal.aborted) return;
-                if (segment === 'none') break;
-                if (segment !== 'later') await this.#load(segment, signal);
+                if (piece === 'none') break;
+                if (piece !== 'later') await this.#load(piece, signal);
             }
             if (!signal.aborted) this.#complete = true;
         } catch (error) {
@@ -213,36 +238,54 @@ export class SegmentPackets implements StreamPackets {
         if (!signal.aborted) this.#wake();
     }
 
-    // The next segment in the rung to fetch it in. none: the stream has ended. later: it is not there yet, or another is to be asked for.
-    async #chooseSegment(signal: AbortSignal): Promise<Segment | 'none' | 'later'> {
+    // What comes next, in the rung to fetch it in. none: the stream has ended. later: it is not there yet, or another is to be asked for.
+    async #choosePiece(signal: AbortSignal): Promise<Piece | 'none' | 'later'> {
         this.#choose();
         const { rung } = this.#choice;
         if (!(await this.#haveList(rung, signal))) return 'later';
         const list = this.#lists.listOf(rung)!;
-        const segment = this.#lists.segment(rung, this.#nextNumber);
-        if (segment) return segment;
-        if (this.#nextNumber < list.firstNumber) {
+        const piece = this.#lists.piece(rung, this.#next, this.#next.part > 0 || this.#takesParts(rung));
+        if (piece === 'over') {
+            this.#next = { number: this.#next.number + 1, part: 0 };
+            this.#shownUs = -Infinity;
+            return 'later';
+        }
+        if (piece) return piece;
+        if (this.#next.number < list.firstNumber) {
             this.#notice('What comes next is no longer there: playing goes on nearer to the end.');
-            this.#lost += list.firstNumber - this.#nextNumber;
-            this.#nextNumber = this.#lists.numberAt(rung, list.ended ? 0 : null);
-            this.#tracks = null;
+            this.#lost += list.firstNumber - this.#next.number;
+            this.#goTo(this.#lists.placeAt(rung, list.ended ? 0 : null).number);
             return list.segments.length > 0 ? 'later' : 'none';
         }
         if (list.ended) return 'none';
+        await this.#awaitList(rung, signal);
+        return 'later';
+    }
+
+    // Until the rung's list may know what comes next.
+    async #awaitList(rung: number, signal: AbortSignal): Promise<void> {
+        // A list that does not know of it at all may be an old one, of a cache that nobody has asked for a while.
+        if (this.#lists.waits(rung) && (await this.#lists.waitFor(rung, this.#next, this.#takesParts(rung), signal))) return;
         await pause(Math.max(this.#lists.goodForMs(rung), 100), signal);
         if (!signal.aborted) await this.#lists.read(rung, signal);
+        if (signal.aborted || this.#next.number <= this.#lists.end(rung).number) return void (this.#backwards = 0);
         // A publisher that begins again begins its numbers again.
-        const again = this.#lists.listOf(rung)!;
-        const last = again.firstNumber + again.segments.length;
-        if (this.#nextNumber > last && !signal.aborted) this.#nextNumber = this.#lists.numberAt(rung, null);
-        return 'later';
+        if (++this.#backwards < surelyBackwards) return;
+        this.#backwards = 0;
+        this.#goTo(this.#lists.placeAt(rung, null).number);
+    }
+
+    // Whether the line bears that the list is read anew for each part.
+    #takesParts(rung: number): boolean {
+        const line = this.#rates.at(-1);
+        return line === undefined || this.#lists.bitsForParts(rung) <= shareForLists * line;
     }
 
     // Whether the rung's list is there; it is read where it is not, or may know of the segment by now.
     async #haveList(rung: number, signal: AbortSignal): Promise<boolean> {
         const list = this.#lists.listOf(rung);
-        const knows = list && (list.ended || this.#lists.segment(rung, this.#nextNumber) !== null);
-        if (knows || (list && this.#lists.goodForMs(rung) > 0)) return true;
+        if (list && (list.ended || this.#lists.piece(rung, this.#next, true) !== null || this.#lists.goodForMs(rung) > 0)) return true;
+        if (list && this.#lists.waits(rung)) return true;
         try {
             await this.#lists.read(rung, signal);
             return true;
@@ -251,55 +294,74 @@ export class SegmentPackets implements StreamPackets {
             this.#notice('One of the qualities of this stream cannot be read.');
             this.#lists.drop(rung);
             if (this.#rung !== null && this.#rung >= rung) this.#rung = null;
-            this.#tracks = null;
+            this.#beginAnew();
             return false;
         }
     }
 
+    // The segment that comes next is fetched from its beginning, in whichever rung; what was fetched of it stays.
+    #beginAnew(): void {
+        if (this.#next.part > 0) this.#shownUs = Math.max(this.#shownUs, this.#fetchedUs);
+        this.#next = { number: this.#next.number, part: 0 };
+        this.#tracks = null;
+    }
+
     #choose(): void {
+        // A segment that was begun goes on as it is.
+        if (this.#next.part > 0 && this.#rung !== null) return void (this.#choice = { rung: this.#rung, reason: this.#choice.reason });
         const rungs = this.#lists.rungs.map(({ bitsPerSecond }) => bitsPerSecond);
         const last = this.#loaded.at(-1) ?? this.#current;
-        const segmentSeconds = last?.segment.seconds ?? 2;
+        const segmentSeconds = last?.piece.seconds ?? 2;
         this.#choice = chooseRung({
             rungs, current: this.#rung, bitsPerSecond: this.#rates, aheadSeconds: this.#ahead, segmentSeconds,
             decodeShare: (this.#decodeMs * 1000) / this.frameUs,
         });
-        if (this.#atMost.number === this.#nextNumber && this.#choice.rung > this.#atMost.rung) this.#choice.rung = this.#atMost.rung;
+        if (this.#atMost.number === this.#next.number && this.#choice.rung > this.#atMost.rung) this.#choice.rung = this.#atMost.rung;
         const { rung } = this.#choice;
         if (this.#rung === null || rung <= this.#rung || this.#rates.at(-1)! < muchMore * rungs[rung]!) return;
         // What waits in a lower rung is fetched again, but for what is shown soon.
-        while (this.#loaded.length > 0 && this.#loaded.at(-1)!.rung < rung && this.#ahead - this.#loaded.at(-1)!.segment.seconds >= keptToRise)
-            this.#nextNumber = this.#loaded.pop()!.segment.number;
+        for (let waits = this.#loaded.at(-1); waits && waits.piece.part === null && waits.rung < rung; waits = this.#loaded.at(-1)) {
+            if (this.#ahead - waits.piece.seconds < keptToRise) break;
+            this.#next = { number: waits.piece.number, part: 0 };
+            this.#shownUs = waits.shownUs;
+            this.#loaded.pop();
+        }
     }
 
     // Fetches it, and its map where its first frame needs what is there.
-    async #load(segment: Segment, signal: AbortSignal): Promise<void> {
+    async #load(piece: Piece, signal: AbortSignal): Promise<void> {
         const { rung } = this.#choice;
-        const anew = this.#tracks === null || rung !== this.#rung;
-        let map = anew ? await this.#map(segment, signal) : null;
+        // All of a segment whose first parts are here.
+        if (piece.part === null && this.#next.part > 0) this.#beginAnew();
+        const begins = piece.part === null || piece.part === 0;
+        const anew = begins && (this.#tracks === null || rung !== this.#rung);
+        if (!begins && this.#tracks === null) return this.#leaveOut(piece);
+        let map = anew ? await this.#map(piece, signal) : null;
         if (signal.aborted) return;
-        if (anew && !map) return this.#leaveOut(segment);
-        const expectedBytes = (this.#lists.rungs[rung]!.bitsPerSecond * segment.seconds) / 8;
-        const lowestBits = (this.#lists.rungs[0]?.bitsPerSecond ?? 0) * segment.seconds;
+        if (anew && !map) return this.#leaveOut(piece);
+        const expectedBytes = (this.#lists.rungs[rung]!.bitsPerSecond * piece.seconds) / 8;
+        const lowestBits = (this.#lists.rungs[0]?.bitsPerSecond ?? 0) * piece.seconds;
         const giveUp = ({ bytes, total, bitsPerSecond }: Progress): boolean =>
             shouldGiveUp({
                 bitsLeft: Math.max(8 * ((total ?? expectedBytes) - bytes), 1), bitsPerSecond, rung, lowestBits,
-                aheadSeconds: this.#ahead, segmentSeconds: segment.seconds,
+                aheadSeconds: this.#ahead, segmentSeconds: piece.seconds,
             });
-        const fetched = await this.#fetchSegment(segment, signal, giveUp);
+        const fetched = await this.#fetchPiece(piece, signal, giveUp);
         if (signal.aborted) return;
-        if (fetched.outcome === 'gone') return this.#leaveOut(segment);
+        if (fetched.outcome === 'gone') return this.#leaveOut(piece);
         if (fetched.outcome === 'given up') {
-            this.#atMost = { number: segment.number, rung: rung - 1 };
-            return this.#measured(fetched.bitsPerSecond);
+            this.#measured(fetched.bitsPerSecond);
+            this.#atMost = { number: piece.number, rung: rung - 1 };
+            if (!begins) this.#beginAnew();
+            return;
         }
-        this.#measured(fetched.bitsPerSecond);
+        this.#add(8 * fetched.bytes.length, fetched.ms);
         try {
             if (!map && hasOtherTracks(fetched.bytes, this.#tracks!)) {
-                map = await this.#map(segment, signal);
+                map = await this.#map(piece, signal);
                 if (signal.aborted) return;
             }
-            const loaded = this.#read(segment, rung, map, fetched.bytes, anew);
+            const loaded = this.#read(piece, rung, map, fetched.bytes, anew);
             this.#loaded.push(loaded);
             // What its lost frames would have left for the next segment is in that one's map.
             if (isCutShort(loaded.movie, fetched.bytes.length)) {
@@ -308,18 +370,20 @@ export class SegmentPackets implements StreamPackets {
             }
         } catch (error) {
             if (!(error instanceof SourceError)) throw error;
-            return this.#leaveOut(segment);
+            return this.#leaveOut(piece);
         }
         this.#rung = rung;
-        this.#nextNumber = segment.number + 1;
+        this.#next = piece.part === null ? { number: piece.number + 1, part: 0 } : { number: piece.number, part: piece.part + 1 };
+        if (piece.part === null) this.#shownUs = -Infinity;
+        this.#fetchedUs = piece.beginUs + piece.seconds * 1e6;
         this.#wake();
         this.#tell();
     }
 
     // Where a connection breaks again and again, it may be this segment's fault alone.
-    async #fetchSegment({ url }: Segment, signal: AbortSignal, giveUp: (progress: Progress) => boolean): Promise<Fetched> {
+    async #fetchPiece({ url }: Piece, signal: AbortSignal, giveUp: (progress: Progress) => boolean): Promise<Fetched> {
         try {
-            const fetched = await fetchFile(url, signal, giveUp);
+            const fetched = await fetchFile(url, signal, { giveUp });
             this.#unreachable = 0;
             return fetched;
         } catch (error) {
@@ -328,7 +392,7 @@ export class SegmentPackets implements StreamPackets {
         }
     }
 
-    async #map({ mapUrl }: Segment, signal: AbortSignal): Promise<Uint8Array | null> {
+    async #map({ mapUrl }: Piece, signal: AbortSignal): Promise<Uint8Array | null> {
         const known = this.#maps.get(mapUrl);
         if (known) return known;
         const fetched = await fetchFile(mapUrl, signal);
@@ -338,7 +402,7 @@ export class SegmentPackets implements StreamPackets {
         return fetched.bytes;
     }
 
-    #read(segment: Segment, rung: number, map: Uint8Array | null, bytes: Uint8Array, anew: boolean): Loaded {
+    #read(piece: Piece, rung: number, map: Uint8Array | null, bytes: Uint8Array, anew: boolean): Loaded {
         if (map) {
             const moov = boxesOf(map).find(({ type }) => type === 'moov');
             if (!moov) throw new SourceError('not-htvm', 'A map has no tables.');
@@ -349,7 +413,7 @@ export class SegmentPackets implements StreamPackets {
         for (const { type, begin, inside } of boxesOf(bytes, true)) if (type === 'moof') readFragment(movie, begin, inside);
         if (tracks.find(({ kind }) => kind === 'meshes')!.samples.count === 0) throw new SourceError('not-htvm', 'A segment has no frames.');
         const reader = new SampleReader(movie, async (offset, size) => (offset >= 0 && offset + size <= bytes.length ? bytes.subarray(offset, offset + size) : null));
-        return { segment, rung, movie, reader, needed: anew ? reader.configurationOf(0) : null, damaged: false };
+        return { piece, rung, movie, reader, needed: anew ? reader.configurationOf(0) : null, damaged: false, shownUs: this.#shownUs };
     }
 
     #lose(loaded: Loaded): void {
@@ -359,18 +423,31 @@ export class SegmentPackets implements StreamPackets {
         this.#tell();
     }
 
-    #leaveOut({ number }: Segment): void {
+    // All of the segment that is not here yet, as parts go on from those before.
+    #leaveOut({ number }: Piece): void {
         ++this.#lost;
         this.#notice('A segment of the stream is gone, or cannot be read, and is left out.');
-        this.#nextNumber = number + 1;
-        this.#tracks = null;
+        this.#goTo(number + 1);
         this.#tell();
     }
 
+    // Parts are small: several together tell what the line brings.
+    #add(bits: number, ms: number): void {
+        this.#came = { bits: this.#came.bits + bits, ms: this.#came.ms + ms };
+        if (this.#came.bits < leastBits && this.#came.ms < mostMs) return this.#tell();
+        this.#measured((1000 * this.#came.bits) / Math.max(this.#came.ms, 1));
+    }
+
     #measured(bitsPerSecond: number): void {
+        this.#came = { bits: 0, ms: 0 };
         this.#rates.push(bitsPerSecond);
         if (this.#rates.length > ratesKept) this.#rates.shift();
         this.#tell();
+    }
+
+    #joinUs(): number {
+        const rung = Math.min(this.#rung ?? 0, this.#lists.rungs.length - 1);
+        return this.#lists.listOf(rung) ? this.#lists.placeAt(rung, null).timeUs : 0;
     }
 
     #tell(): void {
@@ -379,7 +456,7 @@ export class SegmentPackets implements StreamPackets {
         const rate = this.#rates.at(-1);
         this.#report({
             type: 'ladder', rungs, rung, reason, lineMegabitsPerSecond: rate === undefined ? null : rate / 1e6, secondsFetched: this.#ahead,
-            lostSegments: this.#lost, live: this.#lists.live,
+            lostSegments: this.#lost, live: this.#lists.live, joinUs: this.#lists.live ? this.#joinUs() : 0, zeroMs: this.#lists.zeroMs,
         });
     }
 }
