@@ -15,9 +15,6 @@
 namespace htvm::app {
 namespace {
 
-// So many pictures follow before one is coded: what is gained by more is little.
-constexpr int foresight = 19;
-
 constexpr std::array<std::uint16_t, 3> no_gains = {picture_gain_one, picture_gain_one, picture_gain_one};
 
 // Where who watches may start without the frames before: there pictures start too. Not where such frames are many, as
@@ -62,8 +59,9 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
         ->group(heading::textures);
 }
 
-int quantiser_of(PictureCoder coder, double quality) {
-    const double offset = coder == PictureCoder::vp9 ? -4 : 0;  // the same number is coarser
+int quantiser_of(PictureCoder coder, double quality, bool foresees) {
+    // The same number is coarser for VP9, and finer with foresight.
+    const double offset = coder == PictureCoder::vp9 ? -4 : foresees ? 2 : 0;
     return static_cast<int>(std::clamp(std::lround(73 - 0.55 * quality + offset), 1L, 63L));
 }
 
@@ -104,15 +102,16 @@ Result<PictureTrack> PictureTrack::create(const Settings& settings) {
     options.width = out.width_;
     options.height = out.height_;
     options.frames_per_second = std::clamp(settings.frames_per_second, 0.001, 1000.0);
-    options.quantiser = quantiser_of(out.coder_, settings.options.quality.value_or(settings.quality));
     options.bits_per_second = settings.bits_per_second > 0 ? (1 - share_of_meshes) * settings.bits_per_second : 0;
     out.frames_per_second_ = options.frames_per_second;
     out.bits_per_second_ = settings.bits_per_second;
     out.set_ = options.bits_per_second;
     options.buffer_seconds = settings.buffer_seconds;
     options.threads = settings.threads;
-    if (settings.foresees && out.coder_ == PictureCoder::av1 && options.bits_per_second == 0)
-        options.foresight = foresight;
+    options.foresight = settings.speed_ahead && out.coder_ == PictureCoder::av1 && options.bits_per_second == 0;
+    if (options.foresight) options.speed = *settings.speed_ahead;
+    options.quantiser =
+        quantiser_of(out.coder_, settings.options.quality.value_or(settings.quality), options.foresight);
     auto encoder = PictureEncoder::create(options);
     if (!encoder) return tl::unexpected(encoder.error());
     out.encoder_.emplace(std::move(*encoder));

@@ -458,6 +458,19 @@ TEST(EncodePlan, PicturesGetFinerAndLargerWithTheQuality) {
     }
 }
 
+TEST(EncodePlan, PicturesOfFilesAreCodedByThoseThatFollowThemTheSlowerTheMoreEffort) {
+    for (const auto& [effort, speed] : {std::pair(1, 9), std::pair(2, 9), std::pair(3, 8), std::pair(5, 8),
+                                        std::pair(6, 7), std::pair(9, 7)}) {
+        auto request = usual();
+        give(request, "tracked.effort", effort);
+        EXPECT_EQ(plan(request).speed_ahead, speed) << effort;
+    }
+    EXPECT_FALSE(plan(piped()).speed_ahead) << "somebody may wait for each frame";
+    EXPECT_FALSE(plan(to_hub()).speed_ahead);
+    EXPECT_EQ(quantiser_of(PictureCoder::av1, default_quality, /*foresees=*/true),
+              quantiser_of(PictureCoder::av1, default_quality) + 2);
+}
+
 TEST(EncodePlan, ACameraIsReadAtItsPace) {
     EXPECT_EQ(plan(piped()).capture.while_busy, WhileBusy::wait);
     auto request = piped();
