@@ -316,7 +316,7 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     plan.audio = request.audio;
     plan.pictures = request.pictures;
     plan.encoder = encoder_of(request, plan.output);
-    if (is_of_files(request) && !plan.output.may_be_live())
+    if (!may_not_wait(request) && !is_paced(request) && !plan.output.may_be_live())
         plan.speed_ahead = speed_of_pictures(plan.encoder.tracked.effort);
     // A key picture takes as many bits as a second of others.
     constexpr int frames_between_key_pictures = 90;

@@ -60,9 +60,10 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
 }
 
 int quantiser_of(PictureCoder coder, double quality, bool foresees) {
-    // The same number is coarser for VP9, and finer with foresight.
-    const double offset = coder == PictureCoder::vp9 ? -4 : foresees ? 2 : 0;
-    return static_cast<int>(std::clamp(std::lround(73 - 0.55 * quality + offset), 1L, 63L));
+    // The same number is coarser for VP9; with foresight finer where it is large, and coarser where it is small.
+    const double offset = coder == PictureCoder::vp9 ? -4 : 0;
+    const double out = foresees ? 79 - 0.64 * quality : 73 - 0.55 * quality + offset;
+    return static_cast<int>(std::clamp(std::lround(out), 1L, 63L));
 }
 
 int picture_side_of(int usual_side, double quality) {

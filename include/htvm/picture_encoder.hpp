@@ -54,8 +54,8 @@ public:
     std::optional<CodedPicture> pull();
     // Both at once, where there is no foresight: the picture, coded.
     Result<CodedPicture> encode(const PicturePlanes& picture, bool key = false);
-    // Set the quantiser or the rate from the next picture on; with foresight, from the next key picture on. bad_input: out of its range, or the options chose the
-    // other of the two.
+    // Set the quantiser or the rate from the next picture on; with foresight, from the next key picture on. bad_input:
+    // out of its range, or the options chose the other of the two.
     Result<void> set_quantiser(int quantiser);
     Result<void> set_bitrate(double bits_per_second);
 

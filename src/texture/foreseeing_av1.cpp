@@ -20,9 +20,10 @@ constexpr int least_quantiser = 1;  // 0 is taken for another mode
 const bool is_silent = setenv("SVT_LOG", "0", /*replace=*/0) == 0;
 
 tl::unexpected<Error> refused(const std::string& what, EbErrorType error) {
-    const char* why = error == EB_ErrorInsufficientResources ? " (there is too little memory, or there are too many threads)"
-                      : error == EB_ErrorBadParameter        ? " (a setting is out of its range)"
-                                                             : "";
+    const char* why = error == EB_ErrorInsufficientResources
+                          ? " (there is too little memory, or there are too many threads)"
+                      : error == EB_ErrorBadParameter ? " (a setting is out of its range)"
+                                                      : "";
     return fail(ErrorKind::bad_input, "pictures: SVT-AV1 " + what + why);
 }
 

@@ -251,8 +251,8 @@ struct Vp9 {
 struct PictureEncoder::State {
     PictureEncoderOptions options;
     bool foresees;
-    std::variant<Av1, Vp9> coder;                // of pictures as they come
-    std::optional<ForeseeingAv1> ahead = {};     // with foresight: of those since the last key picture
+    std::variant<Av1, Vp9> coder;             // of pictures as they come
+    std::optional<ForeseeingAv1> ahead = {};  // with foresight: of those since the last key picture
     std::uint64_t pictures = 0;
     std::deque<bool> is_key = {};  // of those that wait: whether each has to be a key picture
     std::deque<CodedPicture> ready = {};

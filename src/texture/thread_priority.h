@@ -1,6 +1,6 @@
 // Takes back what a library does to the priority of threads. SVT-AV1, where it runs as root, puts its own threads and
-// the one that calls it before all else on the machine (SCHED_FIFO, 99): a coder of files would hold up whoever serves a
-// live stream beside it.
+// the one that calls it before all else on the machine (SCHED_FIFO, 99): a coder of files would hold up whoever serves
+// a live stream beside it.
 #pragma once
 
 #include <vector>
