@@ -11,9 +11,13 @@
 #include "command_line/headings.h"
 #include "htvm/decoder.hpp"
 #include "htvm/encoder_options.hpp"
+#include "texture/foreseeing_av1.h"
 
 namespace htvm::app {
 namespace {
+
+// What foresight takes for noise is what finer pictures are for: there it takes more bits for the same SSIM.
+constexpr double finest_with_foresight = 85;
 
 constexpr std::array<std::uint16_t, 3> no_gains = {picture_gain_one, picture_gain_one, picture_gain_one};
 
@@ -109,10 +113,11 @@ Result<PictureTrack> PictureTrack::create(const Settings& settings) {
     out.set_ = options.bits_per_second;
     options.buffer_seconds = settings.buffer_seconds;
     options.threads = settings.threads;
-    options.foresight = settings.speed_ahead && out.coder_ == PictureCoder::av1 && options.bits_per_second == 0;
+    const double quality = settings.options.quality.value_or(settings.quality);
+    options.foresight = settings.speed_ahead && quality <= finest_with_foresight && out.coder_ == PictureCoder::av1 &&
+                        options.bits_per_second == 0 && can_foresee(options.width, options.height);
     if (options.foresight) options.speed = *settings.speed_ahead;
-    options.quantiser =
-        quantiser_of(out.coder_, settings.options.quality.value_or(settings.quality), options.foresight);
+    options.quantiser = quantiser_of(out.coder_, quality, options.foresight);
     auto encoder = PictureEncoder::create(options);
     if (!encoder) return tl::unexpected(encoder.error());
     out.encoder_.emplace(std::move(*encoder));

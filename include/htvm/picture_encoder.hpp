@@ -27,7 +27,7 @@ struct PictureEncoderOptions {
     double buffer_seconds = 1;   // of the receiver
     int speed = 8;           // 5..9: 9 takes half the time of 8, with foresight, and some 8 % more bits; without, half
                              // the time of 5, and some 5 % more bits
-    bool foresight = false;  // pictures that follow are waited for, some 30 to 60 of them, before one is coded, where
+    bool foresight = false;  // pictures that follow are waited for, some 30 of them, before one is coded, where
                              // sides are even and of 64 pixels or more: for AV1 by the quantiser
     unsigned threads = 0;    // 0: one per core. The bytes are the same for any number
 };
