@@ -31,8 +31,9 @@ htvm_library(draco FLOORS draco LINKS decoder NEEDS $<BUILD_INTERFACE:${DRACO_LI
 
 # The pictures of textures as video, and back: a library of its own, as the decoder needs none of these.
 find_package(PkgConfig REQUIRED)
-pkg_check_modules(HTVM_VIDEO REQUIRED IMPORTED_TARGET aom vpx dav1d)
-file(GLOB picture_sources CONFIGURE_DEPENDS src/texture/picture_*.cpp src/texture/vp9_*.cpp)
+pkg_check_modules(HTVM_VIDEO REQUIRED IMPORTED_TARGET aom vpx dav1d "SvtAv1Enc>=1.4" "SvtAv1Enc<3")
+file(GLOB picture_sources CONFIGURE_DEPENDS src/texture/picture_*.cpp src/texture/vp9_*.cpp src/texture/foreseeing_*.cpp
+  src/texture/thread_*.cpp)
 htvm_floor(texture SOURCES ${picture_sources} LINKS htvm_decoder PkgConfig::HTVM_VIDEO)
 htvm_library(texture FLOORS texture LINKS decoder NEEDS $<BUILD_INTERFACE:PkgConfig::HTVM_VIDEO> $<INSTALL_INTERFACE:htvm::video>)
 

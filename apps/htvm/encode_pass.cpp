@@ -365,7 +365,7 @@ Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const 
     out.frames_per_second = capture.fps();
     if (!quality) out.bits_per_second = plan.encoder.rate.bits_per_second;  // of all; the settings have the meshes'
     out.buffer_seconds = settings.rate.buffer_seconds;
-    out.foresees = plan.pictures_foresee;
+    out.speed_ahead = plan.speed_ahead;
     out.threads = settings.threads;
     auto track = PictureTrack::create(out);
     if (!track) return tl::unexpected(track.error());

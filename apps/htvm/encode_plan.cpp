@@ -246,8 +246,9 @@ Result<Floor> floor_of(const std::string& text) {
 
 // Below it, time is worth more than bits.
 constexpr int least_effort_with_groups = 3;
-// Pictures coded by those that follow take several times as long.
-constexpr int least_effort_with_foresight = 6;
+
+// PictureEncoderOptions::speed, with foresight: at the least effort as fast as one picture after the other.
+int speed_of_pictures(int effort) { return effort < 3 ? 9 : effort < 6 ? 8 : 7; }
 
 // What the highest effort takes; 0 where there may be no groups.
 int largest_group(EncoderOptions options) {
@@ -315,8 +316,8 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     plan.audio = request.audio;
     plan.pictures = request.pictures;
     plan.encoder = encoder_of(request, plan.output);
-    plan.pictures_foresee = is_of_files(request) && !plan.output.may_be_live() &&
-                            plan.encoder.tracked.effort >= least_effort_with_foresight;
+    if (!may_not_wait(request) && !is_paced(request) && !plan.output.may_be_live())
+        plan.speed_ahead = speed_of_pictures(plan.encoder.tracked.effort);
     // A key picture takes as many bits as a second of others.
     constexpr int frames_between_key_pictures = 90;
     plan.access_interval_with_pictures =

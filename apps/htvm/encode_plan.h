@@ -84,7 +84,7 @@ struct EncodePlan {
     PublishingOptions publishing;  // where the output is a hub
     AudioOptions audio;
     TexturePictureOptions pictures;  // where the capture's images go into the stream
-    bool pictures_foresee = false;   // nobody waits, and bits are worth the time
+    std::optional<int> speed_ahead;  // of pictures coded by those that follow (PictureTrack), where nobody waits
 
     std::optional<FilmWindow> film = {};  // where the texture is one camera's film, once the capture is open: what of
                                           // it goes into the stream at first

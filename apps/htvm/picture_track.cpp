@@ -11,12 +11,13 @@
 #include "command_line/headings.h"
 #include "htvm/decoder.hpp"
 #include "htvm/encoder_options.hpp"
+#include "texture/foreseeing_av1.h"
 
 namespace htvm::app {
 namespace {
 
-// So many pictures follow before one is coded: what is gained by more is little.
-constexpr int foresight = 19;
+// What foresight takes for noise is what finer pictures are for: there it takes more bits for the same SSIM.
+constexpr double finest_with_foresight = 85;
 
 constexpr std::array<std::uint16_t, 3> no_gains = {picture_gain_one, picture_gain_one, picture_gain_one};
 
@@ -62,9 +63,11 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
         ->group(heading::textures);
 }
 
-int quantiser_of(PictureCoder coder, double quality) {
-    const double offset = coder == PictureCoder::vp9 ? -4 : 0;  // the same number is coarser
-    return static_cast<int>(std::clamp(std::lround(73 - 0.55 * quality + offset), 1L, 63L));
+int quantiser_of(PictureCoder coder, double quality, bool foresees) {
+    // The same number is coarser for VP9; with foresight finer where it is large, and coarser where it is small.
+    const double offset = coder == PictureCoder::vp9 ? -4 : 0;
+    const double out = foresees ? 79 - 0.64 * quality : 73 - 0.55 * quality + offset;
+    return static_cast<int>(std::clamp(std::lround(out), 1L, 63L));
 }
 
 int picture_side_of(int usual_side, double quality) {
@@ -104,15 +107,17 @@ Result<PictureTrack> PictureTrack::create(const Settings& settings) {
     options.width = out.width_;
     options.height = out.height_;
     options.frames_per_second = std::clamp(settings.frames_per_second, 0.001, 1000.0);
-    options.quantiser = quantiser_of(out.coder_, settings.options.quality.value_or(settings.quality));
     options.bits_per_second = settings.bits_per_second > 0 ? (1 - share_of_meshes) * settings.bits_per_second : 0;
     out.frames_per_second_ = options.frames_per_second;
     out.bits_per_second_ = settings.bits_per_second;
     out.set_ = options.bits_per_second;
     options.buffer_seconds = settings.buffer_seconds;
     options.threads = settings.threads;
-    if (settings.foresees && out.coder_ == PictureCoder::av1 && options.bits_per_second == 0)
-        options.foresight = foresight;
+    const double quality = settings.options.quality.value_or(settings.quality);
+    options.foresight = settings.speed_ahead && quality <= finest_with_foresight && out.coder_ == PictureCoder::av1 &&
+                        options.bits_per_second == 0 && can_foresee(options.width, options.height);
+    if (options.foresight) options.speed = *settings.speed_ahead;
+    options.quantiser = quantiser_of(out.coder_, quality, options.foresight);
     auto encoder = PictureEncoder::create(options);
     if (!encoder) return tl::unexpected(encoder.error());
     out.encoder_.emplace(std::move(*encoder));

@@ -44,8 +44,8 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
 // (quality_steps()), the pictures' quantiser, and how many pixels they have. Measured: docs/experiments/
 // one_scale_of_quality.md.
 
-// The coder's quantiser.
-int quantiser_of(PictureCoder coder, double quality);
+// The coder's quantiser; foresees: PictureEncoderOptions::foresight.
+int quantiser_of(PictureCoder coder, double quality, bool foresees = false);
 
 // The side of pictures that are drawn anew, from that of the default quality: a multiple of 64, so that what is drawn
 // at a finer quality loses less to being drawn, and at a coarser one no bits go into pixels that nobody sees.
@@ -81,7 +81,8 @@ public:
         int width = 0, height = 0;  // of the pictures
         double quality = 50, frames_per_second = 30;
         double bits_per_second = 0, buffer_seconds = 1;
-        bool foresees = false;  // pictures may be coded by those that follow, where the coder can
+        // Pictures may be coded by those that follow, where the coder can: so fast (PictureEncoderOptions::speed).
+        std::optional<int> speed_ahead;
         unsigned threads = 0;
     };
     static Result<PictureTrack> create(const Settings& settings);

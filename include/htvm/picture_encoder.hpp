@@ -1,8 +1,8 @@
 // Codes the pictures of a textured stream as video: AV1 by libaom, VP9 by libvpx. Each picture is coded as it comes,
-// without those that follow it, so that a live stream waits for nothing; or, for files, once so many that follow are
-// there, for a fifth fewer bits: what stays is then told from the noise of single pictures.
+// without those that follow it, so that a live stream waits for nothing; or, for files, AV1 by SVT-AV1 once those that
+// follow are there, for a quarter fewer bits and more: what stays is then told from the noise of single pictures.
 //
-// Part of the library htvm::texture, which needs libaom, libvpx and libdav1d.
+// Part of the library htvm::texture, which needs libaom, libvpx, libdav1d and SVT-AV1.
 //
 // Threads and lifetimes. One object is used by one thread at a time. What it gives is the caller's.
 #pragma once
@@ -25,10 +25,11 @@ struct PictureEncoderOptions {
     int quantiser = 32;          // 0..63, where no rate is given: how coarse pictures are, the same for all
     double bits_per_second = 0;  // 0: by the quantiser. Otherwise the rate is kept to, over the buffer
     double buffer_seconds = 1;   // of the receiver
-    int speed = 8;               // 5..9: 9 takes half the time of 5, and some 5 % more bits
-    int foresight = 0;     // 0..35: pictures that follow, and are waited for, before one is coded: fewer bits for the
-                           // same error, and several times as long; for AV1 by the quantiser
-    unsigned threads = 0;  // 0: one per core; with foresight always four. The bytes are the same for any number
+    int speed = 8;           // 5..9: 9 takes half the time of 8, with foresight, and some 8 % more bits; without, half
+                             // the time of 5, and some 5 % more bits
+    bool foresight = false;  // pictures that follow are waited for, some 30 of them, before one is coded, where
+                             // sides are even and of 64 pixels or more: for AV1 by the quantiser
+    unsigned threads = 0;    // 0: one per core. The bytes are the same for any number
 };
 
 struct CodedPicture {
@@ -53,8 +54,8 @@ public:
     std::optional<CodedPicture> pull();
     // Both at once, where there is no foresight: the picture, coded.
     Result<CodedPicture> encode(const PicturePlanes& picture, bool key = false);
-    // Set the quantiser or the rate from the next picture on. bad_input: out of its range, or the options chose the
-    // other of the two.
+    // Set the quantiser or the rate from the next picture on; with foresight, from the next key picture on. bad_input:
+    // out of its range, or the options chose the other of the two.
     Result<void> set_quantiser(int quantiser);
     Result<void> set_bitrate(double bits_per_second);
 

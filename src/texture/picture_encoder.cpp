@@ -1,8 +1,6 @@
 // AV1 by libaom and VP9 by libvpx, both in their real-time modes: one picture in, one packet out, every picture from
-// those before it alone. With foresight libaom's mode for files: pictures that are not shown, means of many, and shown
-// ones between them, each packet with those that its shown picture needs. SVT-AV1 1.4, which Debian 12 has, codes
-// without reordering only as an experiment, with a picture's delay and without key pictures on demand, and takes a
-// quarter more bits for the same error.
+// those before it alone. With foresight AV1 by SVT-AV1, of which a new coder begins at each key picture: so pictures
+// from one on are coded alike wherever the stream before them began.
 #include "htvm/picture_encoder.hpp"
 
 #include <aom/aom_encoder.h>
@@ -13,21 +11,19 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <iterator>
 #include <string>
 #include <thread>
 #include <type_traits>
 #include <utility>
 #include <variant>
 
+#include "texture/foreseeing_av1.h"
+
 namespace htvm {
 namespace {
 
 constexpr int largest_quantiser = 63;
 constexpr std::uint32_t smallest_side = 16;
-constexpr int most_foresight = 35;
-// libaom's mode for files gives other bytes with one thread than with several: so there are always as many.
-constexpr unsigned threads_with_foresight = 4;
 constexpr double least_rate = 1e3, most_rate = 1e9;
 // Both count time in units of a rational of 32 bits.
 constexpr int ticks_per_second = 90000;
@@ -51,8 +47,7 @@ Result<void> check(const PictureEncoderOptions& options) {
     if (!(options.buffer_seconds >= 0.01 && options.buffer_seconds <= 3600))
         return refused("the buffer is out of its range");
     if (options.speed < 5 || options.speed > 9) return refused("the speed is not 5 to 9");
-    if (options.foresight < 0 || options.foresight > most_foresight) return refused("the foresight is not 0 to 35");
-    if (options.foresight > 0 && (options.coder != PictureCoder::av1 || options.bits_per_second > 0))
+    if (options.foresight && (options.coder != PictureCoder::av1 || options.bits_per_second > 0))
         return refused("there is foresight for AV1 by the quantiser alone");
     return {};
 }
@@ -124,24 +119,16 @@ struct Av1 {
     }
     Result<void> begin(const PictureEncoderOptions& options) {
         const auto* interface = aom_codec_av1_cx();
-        const bool foresees = options.foresight > 0;
-        const auto usage = foresees ? AOM_USAGE_GOOD_QUALITY : AOM_USAGE_REALTIME;
-        if (aom_codec_enc_config_default(interface, &settings, usage) != AOM_CODEC_OK)
-            return refused("libaom does not have the mode");
+        if (aom_codec_enc_config_default(interface, &settings, AOM_USAGE_REALTIME) != AOM_CODEC_OK)
+            return refused("libaom has no real-time mode");
         set_common(settings, options);
-        settings.g_lag_in_frames = static_cast<unsigned>(options.foresight);
-        if (foresees) settings.g_threads = threads_with_foresight;
         settings.kf_mode = AOM_KF_DISABLED;
         settings.rc_end_usage = options.bits_per_second > 0 ? AOM_CBR : AOM_Q;
         if (options.bits_per_second > 0) set_rate(settings, options.bits_per_second, options.buffer_seconds);
         if (aom_codec_enc_init(&context, interface, &settings, 0) != AOM_CODEC_OK) return refused(why());
         open = true;
-        if (auto set = set_controls(common_controls(options)); !set) return set;
-        return set_controls(foresees ? controls_with_foresight(options.speed) : controls_in_real_time(options.speed));
-    }
-    using Controls = std::vector<std::pair<int, int>>;
-    static Controls common_controls(const PictureEncoderOptions& options) {
-        return {
+        const std::pair<int, int> controls[] = {
+            {AOME_SET_CPUUSED, options.speed},
             {AOME_SET_CQ_LEVEL, options.quantiser},
             {AV1E_SET_ROW_MT, 1},
             {AV1E_SET_TILE_COLUMNS, log2_of_columns(options.width)},
@@ -149,42 +136,15 @@ struct Av1 {
             {AV1E_SET_ENABLE_OBMC, 0},
             {AV1E_SET_ENABLE_WARPED_MOTION, 0},
             {AV1E_SET_ENABLE_GLOBAL_MOTION, 0},
+            {AV1E_SET_ENABLE_ORDER_HINT, 0},
+            {AV1E_SET_COEFF_COST_UPD_FREQ, 2},
+            {AV1E_SET_MODE_COST_UPD_FREQ, 2},
+            {AV1E_SET_MV_COST_UPD_FREQ, 3},
             {AV1E_SET_COLOR_PRIMARIES, AOM_CICP_CP_BT_709},
             {AV1E_SET_TRANSFER_CHARACTERISTICS, AOM_CICP_TC_SRGB},
             {AV1E_SET_MATRIX_COEFFICIENTS, AOM_CICP_MC_BT_709},
             {AV1E_SET_COLOR_RANGE, AOM_CR_STUDIO_RANGE},
         };
-    }
-    static Controls controls_in_real_time(int speed) {
-        return {
-            {AOME_SET_CPUUSED, speed},        {AV1E_SET_ENABLE_ORDER_HINT, 0}, {AV1E_SET_COEFF_COST_UPD_FREQ, 2},
-            {AV1E_SET_MODE_COST_UPD_FREQ, 2}, {AV1E_SET_MV_COST_UPD_FREQ, 3},
-        };
-    }
-    // This mode knows no speed above 6; what takes it longest, and brings 2 to 4 % on pictures of textures, is left
-    // out.
-    static Controls controls_with_foresight(int speed) {
-        if (speed < 6) return {{AOME_SET_CPUUSED, 4}};
-        return {
-            {AOME_SET_CPUUSED, 6},
-            {AV1E_SET_ENABLE_RECT_PARTITIONS, 0},
-            {AV1E_SET_ENABLE_AB_PARTITIONS, 0},
-            {AV1E_SET_ENABLE_1TO4_PARTITIONS, 0},
-            {AV1E_SET_MIN_PARTITION_SIZE, 8},
-            {AV1E_SET_ENABLE_DUAL_FILTER, 0},
-            {AV1E_SET_ENABLE_RESTORATION, 0},
-            {AV1E_SET_ENABLE_MASKED_COMP, 0},
-            {AV1E_SET_ENABLE_INTERINTRA_COMP, 0},
-            {AV1E_SET_ENABLE_DIST_WTD_COMP, 0},
-            {AV1E_SET_ENABLE_FILTER_INTRA, 0},
-            {AV1E_SET_ENABLE_PALETTE, 0},
-            {AV1E_SET_ENABLE_INTRABC, 0},
-            {AV1E_SET_ENABLE_TPL_MODEL, 0},
-            {AV1E_SET_REDUCED_REFERENCE_SET, 1},
-            {AV1E_SET_REDUCED_TX_TYPE_SET, 1},
-        };
-    }
-    Result<void> set_controls(const Controls& controls) {
         for (const auto& [control, value] : controls)
             if (aom_codec_control(&context, control, value) != AOM_CODEC_OK) return refused(why());
         return {};
@@ -197,8 +157,7 @@ struct Av1 {
         if (aom_codec_enc_config_set(&context, &settings) != AOM_CODEC_OK) return refused(why());
         return {};
     }
-    Result<std::vector<CodedPicture>> encode(const PicturePlanes& picture, std::int64_t time, unsigned long ticks,
-                                             bool key) {
+    Result<CodedPicture> encode(const PicturePlanes& picture, std::int64_t time, unsigned long ticks, bool key) {
         aom_image_t image{};
         image.fmt = AOM_IMG_FMT_I420;
         lend_planes(image, picture);
@@ -208,25 +167,13 @@ struct Av1 {
         image.range = AOM_CR_STUDIO_RANGE;
         if (aom_codec_encode(&context, &image, time, ticks, key ? AOM_EFLAG_FORCE_KF : 0) != AOM_CODEC_OK)
             return refused(why());
-        return packets();
-    }
-    // What waits, one after another.
-    Result<std::vector<CodedPicture>> finish() {
-        std::vector<CodedPicture> out;
-        for (;;) {
-            if (aom_codec_encode(&context, nullptr, 0, 1, 0) != AOM_CODEC_OK) return refused(why());
-            auto some = packets();
-            if (some.empty()) return out;
-            std::move(some.begin(), some.end(), std::back_inserter(out));
-        }
-    }
-    std::vector<CodedPicture> packets() {
-        std::vector<CodedPicture> out;
+        CodedPicture out;
         aom_codec_iter_t next = nullptr;
         while (const auto* packet = aom_codec_get_cx_data(&context, &next)) {
             if (packet->kind != AOM_CODEC_CX_FRAME_PKT) continue;
             const auto* bytes = static_cast<const std::uint8_t*>(packet->data.frame.buf);
-            out.push_back({{bytes, bytes + packet->data.frame.sz}, (packet->data.frame.flags & AOM_FRAME_IS_KEY) != 0});
+            out.bytes.insert(out.bytes.end(), bytes, bytes + packet->data.frame.sz);
+            out.key = (packet->data.frame.flags & AOM_FRAME_IS_KEY) != 0;
         }
         return out;
     }
@@ -278,8 +225,7 @@ struct Vp9 {
         if (vpx_codec_enc_config_set(&context, &settings) != VPX_CODEC_OK) return refused(why());
         return {};
     }
-    Result<std::vector<CodedPicture>> encode(const PicturePlanes& picture, std::int64_t time, unsigned long ticks,
-                                             bool key) {
+    Result<CodedPicture> encode(const PicturePlanes& picture, std::int64_t time, unsigned long ticks, bool key) {
         vpx_image_t image{};
         image.fmt = VPX_IMG_FMT_I420;
         image.cs = VPX_CS_BT_709;
@@ -296,39 +242,69 @@ struct Vp9 {
             out.bytes.insert(out.bytes.end(), bytes, bytes + packet->data.frame.sz);
             out.key = (packet->data.frame.flags & VPX_FRAME_IS_KEY) != 0;
         }
-        return std::vector{std::move(out)};
+        return out;
     }
-    static Result<std::vector<CodedPicture>> finish() { return std::vector<CodedPicture>(); }  // none waits
 };
 
 }  // namespace
 
 struct PictureEncoder::State {
     PictureEncoderOptions options;
-    std::variant<Av1, Vp9> coder;
+    bool foresees;
+    std::variant<Av1, Vp9> coder;             // of pictures as they come
+    std::optional<ForeseeingAv1> ahead = {};  // with foresight: of those since the last key picture
     std::uint64_t pictures = 0;
     std::deque<bool> is_key = {};  // of those that wait: whether each has to be a key picture
     std::deque<CodedPicture> ready = {};
     bool finished = false;
-    explicit State(const PictureEncoderOptions& given) : options(given) {
+    explicit State(const PictureEncoderOptions& given)
+        : options(given), foresees(given.foresight && can_foresee(given.width, given.height)) {
         if (options.coder == PictureCoder::vp9) coder.emplace<Vp9>();
     }
-    // Asked for a key picture, libaom's mode for files makes two of it; the first of a new coder is one.
-    Result<void> begin_anew() {
-        if (pictures == 0) return {};
-        auto coded = std::visit([](auto& its) { return its.finish(); }, coder);
-        if (!coded) return tl::unexpected(coded.error());
-        if (auto taken = take(std::move(*coded)); !taken) return taken;
-        return coder.emplace<Av1>().begin(options);
-    }
-    Result<void> take(std::vector<CodedPicture> coded) {
-        for (auto& picture : coded) {
-            if (picture.bytes.empty() || is_key.empty()) return refused("the coder gave nothing for a picture");
-            if (is_key.front() && !picture.key) return refused("the coder gave no key picture where one was asked for");
-            is_key.pop_front();
-            ready.push_back(std::move(picture));
-        }
+    Result<void> take(CodedPicture picture) {
+        if (picture.bytes.empty() || is_key.empty()) return refused("the coder gave nothing for a picture");
+        if (is_key.front() && !picture.key) return refused("the coder gave no key picture where one was asked for");
+        is_key.pop_front();
+        ready.push_back(std::move(picture));
         return {};
+    }
+    Result<void> take(Result<std::vector<CodedPicture>> coded) {
+        if (!coded) return tl::unexpected(coded.error());
+        for (auto& picture : *coded)
+            if (auto taken = take(std::move(picture)); !taken) return taken;
+        return {};
+    }
+    Result<void> push_ahead(const PicturePlanes& picture, bool key) {
+        if (key) {
+            if (auto ended = end_ahead(); !ended) return ended;
+            auto next = ForeseeingAv1::create(options);
+            if (!next) return tl::unexpected(next.error());
+            ahead.emplace(std::move(*next));
+        }
+        is_key.push_back(key);
+        return take(ahead->encode(picture));
+    }
+    // Before another begins, so that there is the memory of one.
+    Result<void> end_ahead() {
+        if (!ahead) return {};
+        auto taken = take(ahead->finish());
+        ahead.reset();
+        if (taken && !is_key.empty()) return refused("the coder gave nothing for a picture");
+        return taken;
+    }
+    Result<void> push_at_once(const PicturePlanes& picture, bool key) {
+        // By number, not by timestamp: rate control shares out by pictures.
+        const double ticks = ticks_per_second / options.frames_per_second;
+        const auto from = std::llround(ticks * static_cast<double>(pictures));
+        const auto to = std::llround(ticks * static_cast<double>(pictures + 1));
+        auto coded = std::visit(
+            [&](auto& its) {
+                return its.encode(picture, from, static_cast<unsigned long>(std::max(to - from, 1LL)), key);
+            },
+            coder);
+        if (!coded) return tl::unexpected(coded.error());
+        is_key.push_back(key);
+        return take(std::move(*coded));
     }
 };
 
@@ -340,8 +316,10 @@ PictureEncoder::~PictureEncoder() = default;
 Result<PictureEncoder> PictureEncoder::create(const PictureEncoderOptions& options) {
     if (auto fine = check(options); !fine) return tl::unexpected(fine.error());
     auto state = std::make_unique<State>(options);
-    auto begun = std::visit([&](auto& coder) { return coder.begin(options); }, state->coder);
-    if (!begun) return tl::unexpected(begun.error());
+    if (!state->foresees) {
+        auto begun = std::visit([&](auto& coder) { return coder.begin(options); }, state->coder);
+        if (!begun) return tl::unexpected(begun.error());
+    }
     return PictureEncoder(std::move(state));
 }
 
@@ -354,32 +332,15 @@ Result<void> PictureEncoder::push(const PicturePlanes& picture, bool key) {
     if (picture.matrix != ColourMatrix::bt709 || picture.full_range)
         return refused("planes to be coded are of BT.709 in limited range");
     if (its.finished) return refused("a picture comes behind the last one");
-    // By number, not by timestamp: rate control shares out by pictures.
-    const double ticks = ticks_per_second / its.options.frames_per_second;
-    const auto from = std::llround(ticks * static_cast<double>(its.pictures));
-    const auto to = std::llround(ticks * static_cast<double>(its.pictures + 1));
-    const bool wants_key = key || its.pictures == 0, foresees = its.options.foresight > 0;
-    if (foresees && wants_key)
-        if (auto begun = its.begin_anew(); !begun) return begun;
-    auto coded = std::visit(
-        [&](auto& coder) {
-            return coder.encode(picture, from, static_cast<unsigned long>(std::max(to - from, 1LL)),
-                                wants_key && !foresees);
-        },
-        its.coder);
-    if (!coded) return tl::unexpected(coded.error());
-    its.is_key.push_back(wants_key);
+    const bool wants_key = key || its.pictures == 0;
+    auto pushed = its.foresees ? its.push_ahead(picture, wants_key) : its.push_at_once(picture, wants_key);
     ++its.pictures;
-    return its.take(std::move(*coded));
+    return pushed;
 }
 
 Result<void> PictureEncoder::finish() {
-    auto& its = *state_;
-    if (std::exchange(its.finished, true) || its.pictures == 0) return {};
-    auto coded = std::visit([](auto& coder) { return coder.finish(); }, its.coder);
-    if (!coded) return tl::unexpected(coded.error());
-    if (auto taken = its.take(std::move(*coded)); !taken) return taken;
-    return its.is_key.empty() ? Result<void>() : refused("the coder gave nothing for a picture");
+    if (std::exchange(state_->finished, true)) return {};
+    return state_->end_ahead();
 }
 
 std::optional<CodedPicture> PictureEncoder::pull() {
@@ -391,7 +352,7 @@ std::optional<CodedPicture> PictureEncoder::pull() {
 }
 
 Result<CodedPicture> PictureEncoder::encode(const PicturePlanes& picture, bool key) {
-    if (state_->options.foresight > 0) return refused("with foresight a picture is not coded at once");
+    if (state_->options.foresight) return refused("with foresight a picture is not coded at once");
     if (auto pushed = push(picture, key); !pushed) return tl::unexpected(pushed.error());
     auto coded = pull();
     if (!coded) return refused("the coder gave nothing for a picture");
@@ -402,6 +363,7 @@ Result<void> PictureEncoder::set_quantiser(int quantiser) {
     if (state_->options.bits_per_second > 0) return refused("the rate decides the quantiser");
     if (quantiser < 0 || quantiser > largest_quantiser) return refused("the quantiser is not 0 to 63");
     state_->options.quantiser = quantiser;
+    if (state_->foresees) return {};
     return std::visit([&](auto& coder) { return coder.set_quantiser(quantiser); }, state_->coder);
 }
 

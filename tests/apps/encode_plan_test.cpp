@@ -317,16 +317,20 @@ TEST(EncodePlan, GroupsOfFramesAreForFilesAlone) {
     EXPECT_EQ(plan(request).encoder.tracked.group, 8) << "the same stream as in a file";
 }
 
-TEST(EncodePlan, PicturesAreCodedByThoseThatFollowWhereNobodyWaitsAndTimeIsWorthLessThanBits) {
-    const auto foresee = [](EncodeRequest request, double effort) {
+TEST(EncodePlan, PicturesOfFilesAreCodedByThoseThatFollowThemTheSlowerTheMoreEffort) {
+    for (const auto& [effort, speed] :
+         {std::pair(1, 9), std::pair(2, 9), std::pair(3, 8), std::pair(5, 8), std::pair(6, 7), std::pair(9, 7)}) {
+        auto request = usual();
         give(request, "tracked.effort", effort);
-        return plan(request).pictures_foresee;
-    };
-    EXPECT_FALSE(plan(usual()).pictures_foresee);
-    EXPECT_FALSE(foresee(usual(), 5));
-    EXPECT_TRUE(foresee(usual(), 6));
-    EXPECT_FALSE(foresee(to_hub(), 6));
-    EXPECT_FALSE(foresee(piped(), 6));
+        EXPECT_EQ(plan(request).speed_ahead, speed) << effort;
+    }
+    EXPECT_TRUE(plan(piped()).speed_ahead);
+    EXPECT_FALSE(plan(to_hub()).speed_ahead);
+    auto to_pipe = usual(), paced = piped();
+    to_pipe.output = "-";
+    EXPECT_FALSE(plan(to_pipe).speed_ahead);
+    paced.deadline = 50;
+    EXPECT_FALSE(plan(paced).speed_ahead);
 }
 
 TEST(EncodePlan, FilesAreInGroupsWhereTheyMayBeAndTimeIsNotWorthMoreThanBits) {
@@ -448,12 +452,14 @@ TEST(EncodePlan, PicturesGetFinerAndLargerWithTheQuality) {
     EXPECT_EQ(picture_side_of(1088, default_quality), 1088);
     EXPECT_EQ(picture_side_of(1024, 100), 2048);
     EXPECT_EQ(picture_side_of(4096, 100), 4096);  // the most there is
-    int side = 0, quantiser = 64;
+    int side = 0, quantiser = 64, ahead = 64;
     for (double quality = 20; quality <= 100; quality += 10) {
         EXPECT_GT(picture_side_of(1024, quality), side);
         EXPECT_LT(quantiser_of(PictureCoder::av1, quality), quantiser);
+        EXPECT_LT(quantiser_of(PictureCoder::av1, quality, /*foresees=*/true), ahead);
         side = picture_side_of(1024, quality);
         quantiser = quantiser_of(PictureCoder::av1, quality);
+        ahead = quantiser_of(PictureCoder::av1, quality, /*foresees=*/true);
         EXPECT_EQ(side % 64, 0);
     }
 }

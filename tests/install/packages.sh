@@ -39,7 +39,7 @@ depends() { dpkg-deb -f "$1_${version}_$machine.deb" Depends; }
     $(depends "$shared") != *aom* ]] ||
     fail "$shared depends on: $(depends "$shared")"
 [[ $(depends "$live") == *libssl3* ]] || fail "$live depends on: $(depends "$live")"
-[[ $(depends "$texture") == *libaom* && $(depends "$texture") == *libdav1d* ]] ||
+[[ $(depends "$texture") == *libaom* && $(depends "$texture") == *libdav1d* && $(depends "$texture") == *libsvtav1enc* ]] ||
     fail "$texture depends on: $(depends "$texture")"
 [[ $(depends libhtvm-dev) == *libexpected-dev* && $(depends libhtvm-dev) == *"$shared (= $version)"* ]] ||
     fail "libhtvm-dev depends on: $(depends libhtvm-dev)"
