@@ -175,8 +175,8 @@ TEST(FrameReasons, TellOfSurfaceThatComesIntoViewAndIsAddedByTheNextFrame) {
     EXPECT_EQ(reasons_of(coded), (std::vector{none, none, none, border, none}));
 }
 
-TEST(FrameReasons, TellOfWhatIsLostWhereSurfaceComesAndGoesWhenTheNextFrameRepairsIt) {
-    auto open = horned_ball(7, 4, 130, 0.2);
+TEST(FrameReasons, TellOfWhatIsLostWhereSurfaceComesAndGoesOnceTwoPatchesWereInVain) {
+    auto open = horned_ball(9, 4, 130, 0.2);
     for (auto& frame : open.frames) {
         const auto below = [&](const auto& triangle) {
             return std::any_of(triangle.begin(), triangle.end(),
@@ -186,7 +186,9 @@ TEST(FrameReasons, TellOfWhatIsLostWhereSurfaceComesAndGoesWhenTheNextFrameRepai
     }
     const auto coded = encode(open, patched_options());
     EXPECT_EQ(coded.infos[4].type, FrameType::tracked);
-    EXPECT_EQ(reasons_of(coded), (std::vector{none, none, none, none, none, surface, none}));
+    EXPECT_EQ(coded.infos[5].type, FrameType::tracked);
+    EXPECT_EQ(coded.infos[6].type, FrameType::intra);
+    EXPECT_EQ(reasons_of(coded), (std::vector{none, none, none, none, none, none, surface, none, none}));
 }
 
 TEST(FrameReasons, TellOfATextureThatIsLaidOutAnew) {
