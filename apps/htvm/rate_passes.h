@@ -11,7 +11,7 @@ namespace htvm::app {
 // Farther off the rate than this, another pass is worth its time. Measured: docs/experiments/rate_control.md.
 inline constexpr double rate_tolerance = 0.05;
 // Passes over a capture, the first included.
-inline constexpr int most_passes = 6;
+inline constexpr int most_passes = 8;
 
 class RatePasses {
 public:

@@ -50,6 +50,19 @@ Model model_of(const std::vector<SharedPass>& passes) {
     return out;
 }
 
+// What the meshes are to have for all to take so much, where pictures keep their quality: they change a little with the
+// meshes that they are drawn on, as the last two passes tell, if they differed in the meshes alone.
+double bits_left_for_meshes(const std::vector<SharedPass>& passes, double wanted) {
+    constexpr double least = 0.5, most = 4;  // bits of all for a bit of meshes
+    const auto& last = passes.back();
+    double for_one = 1;
+    if (passes.size() > 1)
+        if (const auto& before = passes[passes.size() - 2];
+            before.picture_quality == last.picture_quality && before.mesh_bits != last.mesh_bits)
+            for_one = std::clamp((last.bits() - before.bits()) / (last.mesh_bits - before.mesh_bits), least, most);
+    return last.mesh_bits + (wanted - last.bits()) / for_one;
+}
+
 }  // namespace
 
 bool RateSharing::is_met() const {
@@ -67,7 +80,7 @@ RateSharing::Next RateSharing::next() const {
     // are controlled, take the rest, as far as they need not change much for it.
     const auto model = model_of(passes_);
     const auto& last = passes_.back();
-    const double rest = wanted_bits_ - last.picture_bits;
+    const double rest = bits_left_for_meshes(passes_, wanted_bits_);
     constexpr double much = 5;  // steps of quality
     if (is_balanced(last, 0) && last.mesh_quality < finest_mesh && rest > 0 && last.mesh_bits > 0 &&
         std::abs(std::log2(rest / last.mesh_bits)) < much * usual_mesh_slope)
