@@ -214,14 +214,15 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
         if (i != registered.start &&
             follow_nearer_limbs(deformable, surface, others[i], options, registered.motion, &registered.form))
             any = true;
-    if (any) return true;
+    // Where surface comes and goes the next frame goes on from what was found, and looks further if that is not all.
+    if (any && options.open) return true;
     const auto reached =
         reached_for_extremities(deformable, surface, registered.motion, starts.last, {.scale = options.scale});
-    if (reached.empty()) return false;
-    auto near = roughly;  // the body is where it should be already
+    if (reached.empty()) return any;
+    auto near = options.open ? roughly : options;  // the body is where it should be already
     near.coarse_rounds = 0;
     const auto other = register_deformation(deformable, surface, reached, near);
-    return follow_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form);
+    return follow_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form) || any;
 }
 
 namespace {
