@@ -45,7 +45,7 @@ def asked(work):
 def configuration(work):
     with open(EXAMPLE, encoding="utf-8") as file:
         text = file.read()
-    for path, place in (("/var/www/streams", "www"), ("/var/log/nginx", "log"), ("/var/cache/nginx/streams", "cache")):
+    for path, place in (("/var/www/streams", "www"), ("/var/log/nginx", "log"), ("/var/lib/nginx/streams", "cache")):
         text = text.replace(path, f"{work}/{place}")
     text = text.replace("127.0.0.1:8090", f"127.0.0.1:{ORIGIN}").replace("listen 8088", f"listen 127.0.0.1:{EDGE}")
     temporary = "".join(f"    {name}_temp_path {work}/temporary_{name};\n"

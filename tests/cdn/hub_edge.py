@@ -118,7 +118,7 @@ def measure(what, port, viewers, seconds, prefix="/hls/anna"):
 def configuration(work):
     with open(EXAMPLE, encoding="utf-8") as file:
         text = file.read()
-    text = text.replace("/var/cache/nginx", f"{work}/cache").replace("127.0.0.1:8080", f"127.0.0.1:{HUB}")
+    text = text.replace("/var/lib/nginx", f"{work}/cache").replace("127.0.0.1:8080", f"127.0.0.1:{HUB}")
     text = text.replace("listen 8088", f"listen 127.0.0.1:{EDGE}").replace("worker_rlimit_nofile 65536;", "")
     temporary = "".join(f"    {name}_temp_path {work}/temporary_{name};\n"
                         for name in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi"))
