@@ -27,7 +27,7 @@ void add_output(CLI::App& command, EncodeRequest& request) {
     command
         .add_option("--segment", request.segment_seconds,
                     "Of a playlist, -o NAME.m3u8: seconds that a segment lasts at least; it ends where players can\n"
-                    "start (default 2). Of a ladder that goes to a hub: seconds between places to start")
+                    "start (default 2). A ladder that goes to a hub has a place to start so often")
         ->check(CLI::Range(0.1, 60.0))
         ->type_name("SECONDS")
         ->group(heading::output);

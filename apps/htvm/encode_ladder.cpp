@@ -48,7 +48,7 @@ struct Work {
     std::optional<Pass> pass = {};
 };
 
-// Of a hub's address, that of the stream which the rung is. Other hubs may be named without it.
+// A hub's address becomes that of the stream which the rung is. Other hubs may be named without a stream.
 std::string rung_place(const std::string& place, std::size_t number) {
     if (live::looks_like_hub_address(place)) {
         const auto end = std::min(place.find('?'), place.size());
@@ -211,7 +211,7 @@ void tell(Work& work, const PlaylistVariant& variant, nlohmann::json& json) {
                     not_sent > 0 ? fmt::format(", {} not sent, as the line did not take them in time", not_sent) : ""));
 }
 
-// Of a stream that went to a hub only the mean is known.
+// Only the mean is known where a stream went to a hub.
 PlaylistVariant published_variant(const Work& work, double fps) {
     const auto& summary = work.summary;
     const double seconds =

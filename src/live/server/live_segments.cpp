@@ -80,7 +80,7 @@ struct Piece {
 struct Segment {
     std::uint64_t number = 0;
     PlaylistSegment entry;  // with all its parts
-    // Of its first frame, as the session's packets say: what the rungs of a ladder have in common.
+    // As the session's packets say of its first frame: what the rungs of a ladder have in common.
     std::uint64_t session = 0;  // 0: unknown
     std::int64_t timestamp_us = 0;
 };

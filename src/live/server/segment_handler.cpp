@@ -70,7 +70,7 @@ net::awaitable<LiveSegments::Found> find(LiveSegments& segments, const Asked& as
         found.waiting.reset();
         found = look();
     }
-    // Of a ladder's rungs one may never come.
+    // One of a ladder's rungs may never come.
     co_return found.state == LiveSegments::Found::State::waits ? look(false) : found;
 }
 

@@ -16,7 +16,7 @@ export interface Segment {
     /** Of what is needed before its first frame. */
     mapUrl: string;
     seconds: number;
-    /** All of them, or none. Of a segment that is not whole, those that are there. */
+    /** All of them, or none. Where the segment is not whole, those that are there. */
     parts: Part[];
     /** When it was made, milliseconds since 1970; null: not told. */
     dateMs: number | null;

@@ -169,7 +169,7 @@ export class SegmentLists {
         if (!segment) return null;
         const { url, mapUrl, seconds, parts } = segment;
         const whole = url !== '';
-        // Of a segment that was begun in parts and is listed without, all is fetched once more.
+        // A segment that was begun in parts and is listed without them is fetched whole once more.
         if (whole && (part === 0 || parts.length === 0)) return { number, part: null, url, mapUrl, seconds, beginUs: this.beginUs(number) };
         const next = parts[part];
         if (!next) return whole ? 'over' : null;
