@@ -6,7 +6,6 @@
 
 #include <algorithm>
 
-#include "codec/format/sequence.h"
 #include "live_packets.h"
 
 namespace htvm::live {
@@ -21,16 +20,7 @@ Bytes header(std::uint32_t session) { return write_packet(live_header(session, 5
 Bytes intra(std::uint32_t frame) { return write_packet(live_intra(frame, 50)); }
 Bytes tracked(std::uint32_t frame) { return write_packet(live_tracked(frame, 50)); }
 
-// A sequence header that tells something of the stream.
-Bytes real_header(std::uint64_t session_number) {
-    internal::SequenceHeader out;
-    out.session = session_number;
-    out.fps_numerator = 25;
-    out.skeleton.joint_names = {"a", "b"};
-    out.skeleton.bones = {{0, 1}};
-    out.radii = {1};
-    return write_packet(internal::sequence_packet(out));
-}
+Bytes real_header(std::uint64_t session) { return write_packet(readable_header(session, 25)); }
 
 struct Fixture : testing::Test {
     Hub hub{HubLimits{.streams = 2, .viewers = 2}};

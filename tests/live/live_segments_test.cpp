@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "codec/format/sequence.h"
 #include "container/mp4_packets.h"
 #include "container/playlist.h"
 #include "live/hub/stream_name.h"
@@ -271,23 +270,12 @@ TEST(StreamName, ARungHasItsNumberBehindTheLaddersName) {
         EXPECT_FALSE(is_stream_name(name)) << name;
 }
 
-// A header that says of which session it is.
-Packet header_of(std::uint64_t session) {
-    internal::SequenceHeader out;
-    out.session = session;
-    out.fps_numerator = 30;
-    out.skeleton.joint_names = {"a", "b"};
-    out.skeleton.bones = {{0, 1}};
-    out.radii = {1};
-    return internal::sequence_packet(out);
-}
-
 class LiveLadderTest : public testing::Test {
 protected:
     void publish(const std::string& name, std::uint64_t session) {
         rungs[name] = *hub.publish(
             name, [] {}, now);
-        send(name, header_of(session));
+        send(name, readable_header(session, 30));
     }
     void send(const std::string& name, const Packet& packet) {
         ASSERT_TRUE(hub.receive_packet(rungs[name], write_packet(packet), now));
