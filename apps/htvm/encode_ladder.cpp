@@ -20,7 +20,6 @@
 #include "io/number_text.h"
 #include "io/output_file.h"
 #include "live/client/hub_address.h"
-#include "live/hub/stream_name.h"
 #include "segment_folder.h"
 #include "stream_file.h"
 
@@ -48,14 +47,8 @@ struct Work {
     std::optional<Pass> pass = {};
 };
 
-// A hub's address becomes that of the stream which the rung is. Other hubs may be named without a stream.
 std::string rung_place(const std::string& place, std::size_t number) {
-    if (live::looks_like_hub_address(place)) {
-        const auto end = std::min(place.find('?'), place.size());
-        const auto publish = place.find("/publish/");
-        if (publish == std::string::npos || publish > end) return place;
-        return live::rung_name(place.substr(0, end), number) + place.substr(end);
-    }
+    if (live::looks_like_hub_address(place)) return rung_address(place, number);
     const fs::path path(place);
     return (path.parent_path() / fmt::format("{}-{}.m3u8", path.stem().string(), number)).string();
 }

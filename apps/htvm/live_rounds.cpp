@@ -56,7 +56,7 @@ Result<std::vector<Packet>> LiveRounds::take(Packet packet) {
     if (frame) {
         if (!header_ && !begun_) return out;  // nobody could decode it
         if (numbers_.begins_sequence()) drawn_ = session_();
-        later_us_ = static_cast<double>(time_.microseconds()) - static_cast<double>(packet.timestamp_us);
+        later_us_ = static_cast<double>(time_.microseconds() + put_off_us_) - static_cast<double>(packet.timestamp_us);
         begun_ = true;
         ++frames_;
     }

@@ -26,7 +26,12 @@ public:
     // out. unsupported: a stream of version 1, whose headers do not tell hubs what depends on what.
     Result<std::vector<Packet>> take(Packet packet);
 
+    // What comes from here on is so much later than it would be.
+    void put_off(std::uint64_t microseconds) { put_off_us_ += microseconds; }
+
     std::uint64_t frames() const { return frames_; }  // of all rounds
+    // When the last frame of all ends, microseconds from the first one, at the stream's own speed.
+    std::uint64_t end_us() const { return time_.total_us() + put_off_us_; }
 
 private:
     Result<Packet> header_of_session(const Packet& header) const;
@@ -36,6 +41,7 @@ private:
     double speed_;
     FrameNumbers numbers_;  // of this round
     RunningTime time_;      // of all
+    std::uint64_t put_off_us_ = 0;
     std::uint64_t drawn_ = 0;
     std::optional<Packet> header_;  // waits for the frame behind it
     std::vector<Packet> waiting_;   // likewise

@@ -14,6 +14,7 @@
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
 #include "live/client/hub_address.h"
+#include "live/hub/stream_name.h"
 
 namespace htvm::app {
 namespace {
@@ -109,6 +110,13 @@ std::string shown_place(const std::string& path_or_address) {
     if (path_or_address == "-") return "standard output";
     if (!live::looks_like_hub_address(path_or_address)) return path_or_address;
     return path_or_address.substr(0, path_or_address.find('?'));
+}
+
+std::string rung_address(const std::string& address, std::size_t number) {
+    const auto end = std::min(address.find('?'), address.size());
+    const auto publish = address.find("/publish/");
+    if (publish == std::string::npos || publish > end) return address;
+    return live::rung_name(address.substr(0, end), number) + address.substr(end);
 }
 
 Result<Publishing> Publishing::open(const std::string& address, const PublishingOptions& options) {

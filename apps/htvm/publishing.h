@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -61,6 +62,10 @@ std::uint64_t random_session();
 
 // Where a stream goes or comes from, for people: of an address what is not secret.
 std::string shown_place(const std::string& path_or_address);
+
+// Where a ladder's rung is published, by where the ladder is: the stream NAME~NUMBER (stream_name.h). Other hubs may be
+// named without a stream, and stay as they are.
+std::string rung_address(const std::string& address, std::size_t number);
 
 // Publishes, and says on the terminal when the hub is lost and found again.
 class Publishing {

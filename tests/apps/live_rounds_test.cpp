@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "codec/format/sequence.h"
@@ -94,6 +95,28 @@ TEST(LiveRounds, TwiceAsFastTimeTakesHalf) {
     const auto once = rounds_of("tracked_2.htvm", 1), fast = rounds_of("tracked_2.htvm", 1, 2);
     ASSERT_EQ(once.size(), fast.size());
     EXPECT_NEAR(static_cast<double>(fast.back().timestamp_us), static_cast<double>(once.back().timestamp_us) / 2, 1);
+}
+
+TEST(LiveRounds, WhatIsPutOffIsSoMuchLaterAndSoIsTheEnd) {
+    std::uint64_t session = 1;
+    LiveRounds live([&session] { return session++; });
+    std::vector<std::int64_t> times;
+    std::vector<std::uint64_t> ends;
+    for (int round = 0; round < 2; ++round) {
+        live.begin_round();
+        if (round == 1) live.put_off(70000);
+        bool first = true;
+        for (auto& packet : packets_of("sequences_2.htvm")) {
+            const auto taken = live.take(std::move(packet));
+            ASSERT_TRUE(taken);
+            for (const auto& next : *taken)
+                if (frame_type(next.kind) && std::exchange(first, false)) times.push_back(next.timestamp_us);
+        }
+        ends.push_back(live.end_us());
+    }
+    EXPECT_EQ(times[0], 0);
+    EXPECT_EQ(times[1], static_cast<std::int64_t>(ends[0]) + 70000);
+    EXPECT_EQ(ends[1], 2 * ends[0] + 70000);
 }
 
 TEST(LiveRounds, IndicesAreLeftOut) {

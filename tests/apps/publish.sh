@@ -146,6 +146,37 @@ expect 1 "401" "$htvm" encode step --ladder q20,q50 --effort 1 -o "ws://$address
 unset HTVM_TOKEN
 expect 1 "is for segments and hubs" "$htvm" encode step --ladder q20,q50 -o step.htvm
 
+# So does one that is in files, at the time of its frames: as the list of playlists, or as files.
+"$htvm" encode step --ladder q20,q50 --segment 1 --effort 1 -o step.m3u8 2>/dev/null
+"$htvm" pack step-1.m3u8 -o low.htvm 2>/dev/null
+"$htvm" pack step-2.m3u8 -o high.htvm 2>/dev/null
+hub files 0 --segments 1
+expect 0 "75 frames to ws://$address/publish/listed~2" "$htvm" publish step.m3u8 --ladder "ws://$address/publish/listed" --end
+"$htvm" publish low.htvm high.htvm --ladder "ws://$address/publish/named" --end --json >rungs.json 2>rungs.err ||
+    fail "publishing the files of a ladder: $(cat rungs.err)"
+python3 - "http://$address" <<'PYTHON' || fail "a ladder that was published from files"
+import json, re, sys, urllib.request
+get = lambda path: urllib.request.urlopen(sys.argv[1] + path).read().decode()
+for name in "listed", "named":
+    master = get(f"/hls/{name}/master.m3u8")
+    assert re.findall(r"^\.\./.*", master, re.M) == [f"../{name}~{rung}/stream.m3u8" for rung in (1, 2)], master
+    # The rungs are cut at the same times, and their segments have the same numbers and dates.
+    told = []
+    for rung in 1, 2:
+        text = get(f"/hls/{name}~{rung}/stream.m3u8")
+        told.append((re.search(r"SEQUENCE:(\d+)", text).group(1), re.findall(r"DATE-TIME:(\S+)", text), re.findall(r"EXTINF:([\d.]+)", text)))
+    assert told[0] == told[1] and len(told[0][1]) >= 2, told
+last = json.loads(open("rungs.json").readlines()[-1])["rungs"]
+assert [rung["frames"] for rung in last] == [75, 75], last
+assert [rung["hub"].rsplit("/", 1)[1] for rung in last] == ["named~1", "named~2"], last
+PYTHON
+expect 1 "is no ladder: name two files or more" "$htvm" publish low.htvm --ladder "ws://$address/publish/alone"
+"$htvm" synth late --frames 10 --vertices 300 >/dev/null 2>&1
+seq 1 0.04 1.36 >late.csv
+"$htvm" encode late --effort 1 --timestamps late.csv -o late.htvm 2>/dev/null
+expect 1 "rungs are of one capture" "$htvm" publish low.htvm late.htvm --ladder "ws://$address/publish/late"
+expect 2 "the last word is where to" "$htvm" publish low.htvm high.htvm --ladder
+
 # What is wrong is said.
 expect 1 "does not begin with ws://" "$htvm" publish walk.htvm "http://$address/publish/a"
 expect 1 "1 to 65535" "$htvm" decode "ws://localhost:0/watch/a" -o nothing
