@@ -1,7 +1,9 @@
-// examples/nginx/htvm.conf with Debian's nginx and a certificate of its own: what the server says, and the player behind it.
+// examples/nginx/htvm.conf with Debian's nginx and a certificate of its own: what the server says, and the player behind it. And
+// examples/cdn/hub.conf before a hub that the tests make up: what is said of a playlist that was not there, or is old.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { cp, mkdir, mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
+import { createServer as createHttpServer } from 'node:http';
 import { request } from 'node:https';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
@@ -13,7 +15,7 @@ import { conformance, digests, firstSequence, packetsOf, padded } from '../strea
 
 const path = (relative) => fileURLToPath(new URL(relative, import.meta.url));
 const name = 'captures.example.org';
-let work, nginx, port, stream, expected;
+let work, nginx, port, stream, expected, edge, edgePort, hub;
 
 function freePort() {
     return new Promise((resolve) => {
@@ -48,26 +50,44 @@ before(async () => {
         .replace(/ssl_certificate .*;/, `ssl_certificate ${work}/cert.pem;`)
         .replace(/ssl_certificate_key .*;/, `ssl_certificate_key ${work}/key.pem;`)
         .replace('root /var/www/captures;', `root ${site};`);
-    const places = ['client_body', 'proxy', 'fastcgi', 'uwsgi', 'scgi'].map((kind) => `${kind}_temp_path ${work}/${kind};`).join(' ');
-    await writeFile(join(work, 'nginx.conf'),
-        `${process.getuid() === 0 ? 'user root; ' : ''}pid ${work}/pid; error_log ${work}/error.log; events {} http { include /etc/nginx/mime.types; access_log ${work}/access.log; ${places}\n${configuration}\n}\n`);
-    nginx = spawn('nginx', ['-c', join(work, 'nginx.conf'), '-g', 'daemon off;'], { stdio: 'inherit' });
+    nginx = await startNginx('site', `include /etc/nginx/mime.types; access_log ${work}/access.log;\n${configuration}`);
+    await answers('site', () => get('/'));
+    hub = await startHub();
+    edgePort = await freePort();
+    edge = await startNginx('edge', (await readFile(path('../../../examples/cdn/hub.conf'), 'utf8'))
+        .replace(/^[^]*?http \{/, '').replace(/\}\s*$/, '')
+        .replaceAll('/var/lib/nginx', work).replaceAll('127.0.0.1:8080', `127.0.0.1:${hub.port}`)
+        .replace('listen 8088', `listen 127.0.0.1:${edgePort}`));
+    await answers('edge', () => playlist('nothing'));
+});
+
+// What belongs between the braces of http, in a configuration of its own.
+async function startNginx(called, configuration) {
+    const places = ['client_body', 'proxy', 'fastcgi', 'uwsgi', 'scgi'].map((kind) => `${kind}_temp_path ${work}/${called}_${kind};`).join(' ');
+    await writeFile(join(work, `${called}.conf`),
+        `${process.getuid() === 0 ? 'user root; ' : ''}pid ${work}/${called}.pid; error_log ${work}/${called}.log; events {} http { ${places}\n${configuration}\n}\n`);
+    return spawn('nginx', ['-c', join(work, `${called}.conf`), '-g', 'daemon off;'], { stdio: 'inherit' });
+}
+
+async function answers(called, ask) {
     for (let tries = 0; tries < 100; ++tries) {
         try {
-            return void (await get('/'));
+            return void (await ask());
         } catch {
             await new Promise((resolve) => setTimeout(resolve, 50));
         }
     }
-    throw new Error(`nginx does not answer: ${await readFile(join(work, 'error.log'), 'utf8')}`);
-});
+    throw new Error(`nginx does not answer: ${await readFile(join(work, `${called}.log`), 'utf8')}`);
+}
 
 after(async () => {
-    if (nginx) {
-        const ended = new Promise((resolve) => nginx.on('exit', resolve));
-        nginx.kill('SIGTERM');
+    for (const one of [nginx, edge].filter((each) => each)) {
+        const ended = new Promise((resolve) => one.on('exit', resolve));
+        one.kill('SIGTERM');
         await ended;
     }
+    hub?.server.closeAllConnections();
+    hub?.server.close();
     if (work) await rm(work, { recursive: true });
 });
 
@@ -133,4 +153,64 @@ test('the player plays through it, by ranges', { timeout: 60000 }, async () => {
     }
     const log = await readFile(join(work, 'access.log'), 'utf8');
     assert.match(log, /GET \/person\.htvm HTTP\/[12][.\d]*" 206 262144/);
+});
+
+// ---- an edge before a hub -----------------------------------------------------------------------------------------------
+
+// A hub whose playlists are what `lists` has by name, and others not there; `held` keeps its answers back until it is called.
+async function startHub() {
+    const lists = new Map();
+    const asked = [];
+    const out = { lists, asked, wait: null };
+    out.server = createHttpServer(async (incoming, response) => {
+        const stream = incoming.url.split('/')[2];
+        asked.push(stream);
+        await out.wait;
+        const list = lists.get(stream);
+        response.writeHead(list ? 200 : 404, { 'Cache-Control': 'public, max-age=1', 'Content-Type': 'application/vnd.apple.mpegurl' });
+        response.end(list ?? '');
+    });
+    await new Promise((resolve) => out.server.listen(0, '127.0.0.1', resolve));
+    out.port = out.server.address().port;
+    return out;
+}
+
+async function playlist(stream) {
+    const response = await fetch(`http://127.0.0.1:${edgePort}/hls/${stream}/stream.m3u8`);
+    return { status: response.status, cache: response.headers.get('x-cache'), text: await response.text() };
+}
+
+const grownOld = () => new Promise((resolve) => setTimeout(resolve, 2100)); // nginx counts whole seconds
+
+test('the first viewer for a while of a stream that was not there has it, and not that it was not there', async () => {
+    assert.equal((await playlist('anna')).status, 404);
+    assert.equal((await playlist('anna')).cache, 'HIT', 'that it is not there is kept for a moment');
+    hub.lists.set('anna', '#EXTM3U\n');
+    await grownOld();
+    assert.deepEqual(await playlist('anna'), { status: 200, cache: 'EXPIRED', text: '#EXTM3U\n' });
+});
+
+test('the first viewer for a while has the new playlist; who comes while it is fetched has the last one at once', async () => {
+    hub.lists.set('berta', 'the last one');
+    await playlist('berta');
+    hub.lists.set('berta', 'a new one');
+    await grownOld();
+    let release;
+    hub.wait = new Promise((resolve) => (release = resolve));
+    const before = hub.asked.length;
+    const first = playlist('berta');
+    while (hub.asked.length === before) await new Promise((resolve) => setTimeout(resolve, 10));
+    assert.deepEqual(await playlist('berta'), { status: 200, cache: 'UPDATING', text: 'the last one' });
+    release();
+    hub.wait = null;
+    assert.deepEqual(await first, { status: 200, cache: 'EXPIRED', text: 'a new one' });
+    assert.equal(hub.asked.length, before + 1);
+});
+
+test('a hub that is back before its publishers takes no playlist away', async () => {
+    hub.lists.set('clara', 'the last one');
+    await playlist('clara');
+    hub.lists.delete('clara');
+    await grownOld();
+    assert.deepEqual(await playlist('clara'), { status: 200, cache: 'STALE', text: 'the last one' });
 });
