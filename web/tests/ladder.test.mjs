@@ -16,44 +16,112 @@ const options = { skip: program ? false : 'HTVM names no program', timeout: 1800
 const path = (relative) => fileURLToPath(new URL(relative, import.meta.url));
 const mega = 1e6;
 
-let chooseRung, shouldGiveUp;
+let chooseRung, shouldGiveUp, Trials;
 
 before(async () => {
     const { outputFiles } = await build({
         entryPoints: [path('../packages/player/src/rung_choice.ts')], bundle: true, format: 'esm', platform: 'node', write: false, logLevel: 'error',
     });
-    ({ chooseRung, shouldGiveUp } = await import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].contents).toString('base64')}`));
+    ({ chooseRung, shouldGiveUp, Trials } = await import(`data:text/javascript;base64,${Buffer.from(outputFiles[0].contents).toString('base64')}`));
 });
 
 // ---- the choice -------------------------------------------------------------------------------------------------------
 
-const state = (more) => ({
-    rungs: [0.3 * mega, 0.8 * mega, 2 * mega], current: 1, bitsPerSecond: [1.2 * mega, 1.2 * mega], aheadSeconds: 4, segmentSeconds: 1, decodeShare: 0.1,
-    ...more,
-});
+// came: what the line brought with each of the last segments, Mbit/s, and the share of its time that the segment took; where that
+// is not told, it is what its rate would take.
+const state = ({ came = [1.2, 1.2], ...more }) => {
+    const out = { rungs: [0.3 * mega, 0.8 * mega, 2 * mega], current: 1, aheadSeconds: 4, segmentSeconds: 1, decodeShare: 0.1, restSeconds: 0, ...more };
+    const shareAt = (rate) => out.rungs[out.current ?? 0] / (rate * mega);
+    return { ...out, measured: came.map((one) => (Array.isArray(one) ? one : [one, shareAt(one)])).map(([rate, share]) => ({ bitsPerSecond: rate * mega, share })) };
+};
 
 for (const [what, more, rung, reason] of [
     ['a stream of one quality has no choice', { rungs: [mega], current: 0 }, 0, /only one/],
-    ['before anything was measured it begins low', { current: null, bitsPerSecond: [] }, 0, /begins low/],
+    ['before anything was measured it begins low', { current: null, came: [] }, 0, /begins low/],
     ['the line bears what is fetched: it stays', {}, 1, /1\.2 Mbit\/s/],
-    ['the line bears more, twice in a row: it rises', { bitsPerSecond: [4 * mega, 4 * mega] }, 2, /4\.0 Mbit\/s/],
-    ['the line bore more only once: it stays', { bitsPerSecond: [1 * mega, 4 * mega] }, 1, /4\.0 Mbit\/s/],
-    ['the line bears more, but for one segment: it rises', { bitsPerSecond: [4 * mega, 1 * mega, 4 * mega] }, 2, /4\.0 Mbit\/s/],
-    ['the line bears far more than the next rung, if only once: it rises by one', { current: 0, bitsPerSecond: [0.4 * mega, 4 * mega] }, 1, /4\.0 Mbit\/s/],
-    ['from the lowest it may rise by two', { current: 0, bitsPerSecond: [4 * mega, 4 * mega] }, 2, /4\.0 Mbit\/s/],
-    ['the last segment came too slowly: it falls at once', { current: 2, bitsPerSecond: [4 * mega, 0.4 * mega] }, 0, /0\.4 Mbit\/s/],
-    ['it came too slowly, and hardly anything is ahead: it falls to the lowest', { current: 2, bitsPerSecond: [4 * mega, 1.2 * mega], aheadSeconds: 0.5 }, 0, /1\.2 Mbit\/s/],
-    ['the line bears not even the lowest: the lowest', { current: 2, bitsPerSecond: [0.1 * mega] }, 0, /0\.1 Mbit\/s/],
-    ['a rate a little above the line is kept to until it falls short', { current: 1, bitsPerSecond: [0.9 * mega] }, 1, /0\.9 Mbit\/s/],
-    ['too little is ahead: it does not rise', { bitsPerSecond: [4 * mega, 4 * mega], aheadSeconds: 0.3 }, 1, /too little is ahead/],
-    ['decoding takes too long: it falls, whatever the line', { bitsPerSecond: [4 * mega, 4 * mega], decodeShare: 0.9 }, 0, /decoding takes too long/],
-    ['decoding takes half of the time: it does not rise', { bitsPerSecond: [4 * mega, 4 * mega], decodeShare: 0.5 }, 1, /50 % of the time/],
+    ['the line bears more, twice in a row: it rises', { came: [4, 4] }, 2, /4\.0 Mbit\/s/],
+    ['the line bore more only once: it stays', { came: [1, 4] }, 1, /4\.0 Mbit\/s/],
+    ['the line bears more, but for one segment: it rises', { came: [4, 1, 4] }, 2, /4\.0 Mbit\/s/],
+    ['the line bears far more than the next rung, if only once: it rises by one', { current: 0, came: [0.4, 4] }, 1, /4\.0 Mbit\/s/],
+    ['from the lowest it may rise by two', { current: 0, came: [4, 4] }, 2, /4\.0 Mbit\/s/],
+    ['the last segment came too slowly: it falls at once', { current: 2, came: [4, 0.4] }, 0, /0\.4 Mbit\/s/],
+    ['it came too slowly, and hardly anything is ahead: it falls to the lowest', { current: 2, came: [4, 1.2], aheadSeconds: 0.5 }, 0, /1\.2 Mbit\/s/],
+    ['the line bears not even the lowest: the lowest', { current: 2, came: [0.1] }, 0, /0\.1 Mbit\/s/],
+    ['a segment that was given up came too slowly', { current: 2, came: [4, [0.4, Infinity]] }, 0, /0\.4 Mbit\/s/],
+    ['a rate a little above the line is kept to until it falls short', { current: 1, came: [0.9] }, 1, /0\.9 Mbit\/s/],
+    ['too little is ahead for the time that a finer segment takes more: it does not rise', { came: [4, 4], aheadSeconds: 0.1 }, 1, /too little is ahead/],
+    ['near the end of a live stream little is ahead, but enough for that: it rises', { came: [4, 4], aheadSeconds: 0.16 }, 2, /4\.0 Mbit\/s/],
+    ['for one rung it is enough, and for two it is not: it rises by one', { current: 0, came: [4, 4], aheadSeconds: 0.1 }, 1, /4\.0 Mbit\/s/],
+    ['decoding takes too long: it falls, whatever the line', { came: [4, 4], decodeShare: 0.9 }, 0, /decoding takes too long/],
+    ['decoding takes half of the time: it does not rise', { came: [4, 4], decodeShare: 0.5 }, 1, /50 % of the time/],
+    ['a small segment that came in half of its time did not come too slowly', { came: [0.8, [0.3, 0.5]] }, 1, /0\.3 Mbit\/s/],
+    ['one that took more of it did', { came: [0.8, [0.3, 0.51]] }, 0, /0\.3 Mbit\/s/],
 ])
     test(what, () => {
         const choice = chooseRung(state(more));
         assert.equal(choice.rung, rung);
         assert.match(choice.reason, reason);
+        assert.ok(!choice.tried);
     });
+
+// ---- small segments: they tell little of the line -----------------------------------------------------------------------
+
+const small = [[0.4, 0.1], [0.4, 0.1]]; // a tenth of their time, and a rate that the next rung does not have
+for (const [what, more, rung, tried] of [
+    ['two small segments in a row came soon: the next rung is tried', {}, 1, true],
+    ['one alone says too little', { came: [[0.4, 0.1]] }, 0, false],
+    ['the one before did not come soon', { came: [[0.4, 0.26], [0.4, 0.1]] }, 0, false],
+    ['a quarter of their time is soon', { came: [[0.4, 0.25], [0.4, 0.25]] }, 1, true],
+    ['the rest after a trial in vain is not over', { restSeconds: 0.1 }, 0, false],
+    ['too little is ahead', { aheadSeconds: 0.01 }, 0, false],
+    ['a little is ahead, and a finer segment hardly comes later', { aheadSeconds: 0.02 }, 1, true],
+    ['decoding takes half of the time', { decodeShare: 0.5 }, 0, false],
+    ['from the highest there is nothing to try', { current: 2, came: [[2.5, 0.1], [2.5, 0.1]] }, 2, false],
+    ['what the line brings is known to bear the next rung: that is no trial', { came: [[1.2, 0.1], [1.2, 0.1]] }, 1, false],
+])
+    test(`trials: ${what}`, () => {
+        const choice = chooseRung(state({ current: 0, came: small, ...more }));
+        assert.deepEqual([choice.rung, choice.tried ?? false], [rung, tried]);
+    });
+
+test('after each trial in vain none follows for twice as long, up to 64 s of the stream', () => {
+    const trials = new Trials();
+    const rests = [];
+    for (let i = 0; i < 6; ++i) {
+        assert.equal(trials.restSeconds, 0);
+        trials.chose({ rung: 1, tried: true });
+        trials.came(1);
+        trials.chose({ rung: 0 });
+        rests.push(trials.restSeconds);
+        for (let second = 0; second < rests.at(-1); ++second) trials.came(1);
+    }
+    assert.deepEqual(rests, [4, 8, 16, 32, 64, 64]);
+});
+
+test('a rung that was tried and kept up for eight seconds is no trial any more, and the next rest is short again', () => {
+    const trials = new Trials();
+    const tryInVain = () => {
+        trials.chose({ rung: 1, tried: true });
+        trials.chose({ rung: 0 });
+        return trials.restSeconds;
+    };
+    assert.deepEqual([tryInVain(), tryInVain()], [4, 8]);
+    trials.chose({ rung: 1, tried: true });
+    for (let second = 0; second < 8; ++second) {
+        trials.came(1);
+        trials.chose({ rung: 1 });
+    }
+    trials.chose({ rung: 0 });
+    assert.equal(trials.restSeconds, 0, 'it fell for another reason');
+    assert.equal(tryInVain(), 4);
+});
+
+test('whoever falls below a rung that was not tried may try at once', () => {
+    const trials = new Trials();
+    trials.chose({ rung: 2 });
+    trials.chose({ rung: 0 });
+    assert.equal(trials.restSeconds, 0);
+});
 
 const arriving = (more) => ({
     bitsLeft: 1.5 * mega, bitsPerSecond: 4 * mega, aheadSeconds: 3, segmentSeconds: 1, rung: 2, lowestBits: 0.3 * mega, ...more,

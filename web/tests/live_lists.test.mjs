@@ -1,7 +1,7 @@
 // Live playlists as a viewer takes them: parts of segments, lists that are waited for, rungs that number their segments
 // otherwise; and servers that lie. Under Node, by answers that the tests make up.
 import assert from 'node:assert/strict';
-import { before, beforeEach, test } from 'node:test';
+import { before, beforeEach, mock, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
 
@@ -189,6 +189,136 @@ test('a list that is older than the one before is taken, and times stay', async 
     assert.equal(lists.endUs, 3.25e6);
 });
 
+// ---- what is not there yet ----------------------------------------------------------------------------------------------
+
+// Runs it in virtual time: the seconds at which something was asked for, what was said, and what came of it.
+async function waitingFor(run) {
+    mock.timers.enable({ apis: ['setTimeout'] });
+    const [seconds, notices] = [[], []];
+    const { fetch: plain } = globalThis;
+    let [second, outcome] = [0, null];
+    globalThis.fetch = (...more) => {
+        seconds.push(second);
+        return plain(...more);
+    };
+    try {
+        run((text) => notices.push(text)).then((value) => (outcome = { value }), (error) => (outcome = { error }));
+        for (; ; ++second) {
+            for (let i = 0; i < 20; ++i) await new Promise((resolve) => setImmediate(resolve));
+            if (outcome || second > 200) return { seconds, notices, outcome };
+            mock.timers.tick(1000);
+        }
+    } finally {
+        globalThis.fetch = plain;
+        mock.timers.reset();
+    }
+}
+
+test('a playlist that is not there yet is asked for again, with pauses that grow, and said to be waited for once', async () => {
+    let answers = 0;
+    answer = () => (++answers < 5 ? null : list(...segments(10, 2)));
+    let lists;
+    const { seconds, notices, outcome } = await waitingFor((notice) => (lists = new parts.SegmentLists(base, notice)).open(signal));
+    assert.equal(outcome.error, undefined);
+    assert.deepEqual(seconds, [0, 1, 3, 7, 15]);
+    assert.deepEqual(notices, ['The stream is not there yet. It is waited for.']);
+    assert.equal(lists.listOf(0).segments.length, 2);
+});
+
+test('one that does not come within a minute is missing', async () => {
+    answer = () => null;
+    const { seconds, outcome } = await waitingFor((notice) => new parts.SegmentLists(base, notice).open(signal));
+    assert.deepEqual(seconds, [0, 1, 3, 7, 15, 23, 31, 39, 47, 55, 63]);
+    assert.equal(outcome.error.code, 'missing');
+    assert.match(outcome.error.message, /There is no playlist at https:\/\/a\.example\/hls\/anna\/stream\.m3u8/);
+});
+
+test('the lowest playlist of a list of them is waited for, too', async () => {
+    let answers = 0;
+    answer = ({ pathname }) => (pathname.endsWith('master.m3u8') ? ladder : ++answers < 3 ? null : list(...segments(10, 2)));
+    const { seconds, notices, outcome } = await waitingFor((notice) => new parts.SegmentLists('https://a.example/hls/anna/master.m3u8', notice).open(signal));
+    assert.equal(outcome.error, undefined);
+    assert.deepEqual(seconds, [0, 0, 1, 3]);
+    assert.equal(notices.length, 1);
+});
+
+test('whoever leaves waits no longer', async () => {
+    const abort = new AbortController();
+    answer = () => null;
+    setImmediate(() => abort.abort());
+    const { seconds, outcome } = await waitingFor((notice) => new parts.SegmentLists(base, notice).open(abort.signal));
+    assert.equal(outcome.error.message, 'aborted');
+    assert.deepEqual(seconds, [0]);
+});
+
+test('a finer playlist that is not there is put off, each time for longer', async () => {
+    const lists = await withRungs(list(...segments(10, 2)), null);
+    const { now } = performance;
+    let clock = 0;
+    performance.now = () => clock;
+    try {
+        const seconds = [];
+        for (let i = 0; i < 6; ++i) {
+            await assert.rejects(lists.read(1, signal), { code: 'missing' });
+            lists.putOff(1);
+            const begin = clock;
+            while (lists.isPutOff(1)) clock += 500;
+            seconds.push((clock - begin) / 1000);
+        }
+        assert.deepEqual(seconds, [1, 2, 4, 8, 8, 8]);
+        assert.equal(lists.isPutOff(0), false);
+    } finally {
+        performance.now = now;
+    }
+});
+
+test('a list that was there, and is not for a while, is asked for less and less, and given up after a minute', async () => {
+    const { now } = performance;
+    let clock = 0;
+    performance.now = () => clock;
+    try {
+        answer = () => list(...segments(10, 2));
+        const notices = [];
+        const lists = new parts.SegmentLists(base, (text) => notices.push(text));
+        await lists.open(signal);
+        answer = () => null;
+        const seconds = [];
+        const noted = [];
+        for (;;) {
+            const good = lists.goodForMs(0);
+            clock += good;
+            seconds.push(good / 1000);
+            const failed = await lists.read(0, signal).then(() => null, (error) => error);
+            noted.push(notices.length);
+            if (failed) {
+                assert.equal(failed.code, 'missing');
+                break;
+            }
+        }
+        assert.deepEqual(seconds, [0.5, 0.5, 1, 2, 4, 8, 8, 8, 8, 8, 8]);
+        assert.deepEqual(noted.slice(0, 4), [0, 0, 1, 1]);
+        assert.deepEqual(notices, ['What comes next of the stream cannot be had at the moment. It is waited for.']);
+    } finally {
+        performance.now = now;
+    }
+});
+
+test('one that is there again is asked for as before', async () => {
+    const lists = await opened(list(...segments(10, 2)));
+    const { now } = performance;
+    performance.now = () => 1000;
+    try {
+        answer = () => null;
+        for (let i = 0; i < 4; ++i) await lists.read(0, signal);
+        assert.equal(lists.goodForMs(0), 4000);
+        answer = () => list(...segments(10, 3));
+        await lists.read(0, signal);
+        assert.equal(lists.goodForMs(0), 500);
+    } finally {
+        performance.now = now;
+    }
+});
+
 // ---- rungs --------------------------------------------------------------------------------------------------------------
 
 const dated = (first, count, ms) =>
@@ -200,7 +330,7 @@ async function withRungs(first, second) {
     answer = ({ pathname }) => texts[pathname] ?? null;
     const lists = new parts.SegmentLists('https://a.example/hls/anna/master.m3u8');
     await lists.open(signal);
-    await lists.read(1, signal);
+    if (second) await lists.read(1, signal);
     return lists;
 }
 

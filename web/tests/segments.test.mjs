@@ -2,7 +2,7 @@
 // shows of the bare stream. HTVM names the program that makes the streams.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdir, mkdtemp, readdir, readFile, rm, unlink, writeFile } from 'node:fs/promises';
+import { cp, mkdir, mkdtemp, readdir, readFile, rm, unlink, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
@@ -266,13 +266,23 @@ test('a live window is joined near its end, plays on as it slides, and ends wher
     assert.ok(shown.length > frames / 3, `${shown.length} frames`);
 });
 
-test('words where there is no playlist, and where it is none', options, async () => {
+test('a playlist that is not there yet is waited for, with a notice, and then plays', options, async () => {
+    const bare = await play('/as-is/dancer.htvm');
+    await page.evaluate(() => {
+        window.playing = window.test.playAll({ src: '/segments/later/dancer.m3u8' });
+    });
+    await page.waitForFunction(() => window.test.notices.length > 0);
+    assert.deepEqual(await page.evaluate(() => [window.test.notices, window.test.player.error]), [['The stream is not there yet. It is waited for.'], null]);
+    await cp(join(work, 'whole'), join(work, 'later'), { recursive: true });
+    assert.deepEqual(await page.evaluate(() => window.playing), bare);
+});
+
+test('words where a playlist is none', options, async () => {
     const error = async (src) => {
         await page.evaluate((address) => window.test.open({ src: address }), src);
         await page.waitForFunction(() => window.test.player.error !== null);
         return page.evaluate(() => window.test.player.error);
     };
-    assert.equal((await error('/segments/nowhere.m3u8')).code, 'missing');
     await writeFile(join(work, 'page.m3u8'), '<!doctype html>');
     assert.match((await error('/segments/page.m3u8')).message, /does not begin with #EXTM3U/);
     await writeFile(join(work, 'picture.mp4'), box('ftyp', Buffer.from('isom0000')));

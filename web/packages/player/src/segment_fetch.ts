@@ -7,6 +7,7 @@ const lookEveryMs = 100;
 const rateOverMs = 600; // what the line brings now is measured over so long
 const leastMs = 300; // of a transfer, before it can be given up,
 const leastSilentMs = 1000; // or of an answer that has not begun: a cache may be waiting for it
+const runningMs = 50; // that bytes come one after another, before their rate is taken instead of that of the whole answer
 
 /** How a transfer goes: bytes that have come, all that will (null: not told), and bits a second now. */
 export interface Progress {
@@ -15,9 +16,17 @@ export interface Progress {
     bitsPerSecond: number;
 }
 
+/** How an answer came. What was before it is the way there and back, and the server's own time. */
+export interface Came {
+    /** From the beginning of the answer to its end. */
+    ms: number;
+    /** Those that tell what the line brings, and how long they took: where most bytes ran for a while, without those that were there first. */
+    bits: number;
+    bitsMs: number;
+}
+
 export type Fetched =
-    /** ms: from the beginning of the answer to its end. What was before is the way there and back, and the server's own time. */
-    | { outcome: 'here'; bytes: Uint8Array; ms: number; url: string }
+    | { outcome: 'here'; bytes: Uint8Array; came: Came; url: string }
     /** The server does not have it. */
     | { outcome: 'gone' }
     | { outcome: 'given up'; bitsPerSecond: number };
@@ -79,11 +88,15 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
         const length = Number(response.headers.get('Content-Length') ?? NaN);
         if (length > 0 && !response.headers.get('Content-Encoding')) total = length;
         const parts: Uint8Array[] = [];
+        let first: { at: number; bytes: number } | null = null;
+        let last = begun;
         const reader = response.body!.getReader();
         for (;;) {
             const { done, value } = await reader.read();
             if (done) break;
             bytes += value.length;
+            last = performance.now();
+            first ??= { at: last, bytes };
             if (bytes > mostBytes) {
                 abort.abort();
                 return { outcome: 'gone' };
@@ -96,7 +109,10 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
             whole.set(part, at);
             at += part.length;
         }
-        return { outcome: 'here', bytes: whole, ms: performance.now() - begun, url: response.url || url };
+        const ms = performance.now() - begun;
+        const ran = first && last - first.at >= runningMs && bytes - first.bytes >= bytes / 2;
+        const came = ran ? { ms, bits: 8 * (bytes - first!.bytes), bitsMs: last - first!.at } : { ms, bits: 8 * bytes, bitsMs: ms };
+        return { outcome: 'here', bytes: whole, came, url: response.url || url };
     } catch (error) {
         if (givenUp > 0) return { outcome: 'given up', bitsPerSecond: givenUp };
         throw error;
@@ -104,4 +120,17 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
         clearInterval(look);
         signal.removeEventListener('abort', stop);
     }
+}
+
+/** Ends early where the signal aborts. */
+export function pause(milliseconds: number, signal: AbortSignal): Promise<void> {
+    return new Promise((resolve) => {
+        const end = (): void => {
+            clearTimeout(timer);
+            signal.removeEventListener('abort', end);
+            resolve();
+        };
+        const timer = setTimeout(end, milliseconds);
+        signal.addEventListener('abort', end);
+    });
 }

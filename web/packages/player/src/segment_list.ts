@@ -3,12 +3,16 @@
 // own numbers do. Media time 0 is where the first list that was read begins.
 import { SourceError } from './byte_source.js';
 import { readPlaylist, type MediaPlaylist, type Segment, type Variant } from './playlist.js';
-import { fetchFile } from './segment_fetch.js';
+import { fetchFile, pause } from './segment_fetch.js';
 
 const edgeTargets = 3; // so many target durations before the end of a live list playing begins;
 const edgeTargetsAsked = 2.5; // so many where the server says at once what comes;
 const edgeParts = 3; // so many parts where there are parts, unless the list says how much
-const mostFailures = 8; // in a row, of a list that is read again
+const mostFailures = 10; // in a row, of a list that is read again; with the pauses between a minute or more
+const tellingFailures = 3; // after which it is said that the stream is waited for
+const firstAbsentMs = 1000; // until what is not there is asked for again; then twice as long each time,
+const longestAbsentMs = 8000;
+const mostAbsentMs = 60000; // in all
 const mostVain = 3; // in a row, of answers that do not have what was asked for
 const mostDated = 100; // segments of a list whose dates are looked at
 const waitTargets = 4; // for so many target durations a server may let those wait who ask for what comes next
@@ -20,6 +24,10 @@ interface Rung {
     letters: number;
     readMs: number;
     failures: number;
+    /** It is not there, and is not asked for again before: performance.now(). */
+    putOffMs: number;
+    /** For so long it was put off last. */
+    offMs: number;
     /** What is added to its own numbers. */
     shift: number;
     /** Answers in a row that did not have what was asked for, since something came. */
@@ -47,13 +55,15 @@ export interface Piece {
 
 export class SegmentLists {
     #url: string;
+    #notice: (text: string) => void;
     #rungs: Rung[] = [];
     #begins = new Map<number, number>(); // microseconds, by number
     #dates = new Map<number, number>(); // milliseconds since 1970, by number
     #endUs = 0;
 
-    constructor(url: string) {
+    constructor(url: string, notice: (text: string) => void = () => undefined) {
         this.#url = url;
+        this.#notice = notice;
     }
 
     get rungs(): readonly Variant[] {
@@ -76,15 +86,19 @@ export class SegmentLists {
         return this.#rungs.some(({ list }) => list !== null && !list.ended);
     }
 
-    /** Reads what is at the address: a playlist, or a list of playlists and the lowest of these. */
+    /** Reads what is at the address: a playlist, or a list of playlists and the lowest of these. Where nothing is, it is waited for. */
     async open(signal: AbortSignal): Promise<void> {
-        if (this.#rungs.length > 0) return;
-        const { text, url } = await this.#fetch(this.#url, signal);
+        if (this.#rungs.length > 0 && this.#rungs[0]!.list) return;
+        const { text, url } = await this.#await(this.#url, signal);
         const read = readPlaylist(text, url);
-        const rung = (variant: Variant): Rung => ({ variant, list: null, letters: 0, readMs: 0, failures: 0, shift: 0, vain: 0, doesNotWait: false });
+        const rung = (variant: Variant): Rung => ({
+            variant, list: null, letters: 0, readMs: 0, failures: 0, putOffMs: 0, offMs: 0, shift: 0, vain: 0, doesNotWait: false,
+        });
         if ('variants' in read) {
             this.#rungs = read.variants.map(rung);
-            await this.read(0, signal);
+            const lowest = this.#rungs[0]!;
+            const { text: itsText, url: itsUrl } = await this.#await(lowest.variant.url, signal);
+            this.#take(lowest, readSegmentList(itsText, itsUrl), itsText.length);
         } else {
             this.#rungs = [rung({ url: this.#url, bitsPerSecond: 0, resolution: '', codecs: '' })];
             this.#take(this.#rungs[0]!, read.playlist, text.length);
@@ -104,14 +118,28 @@ export class SegmentLists {
         this.#rungs.splice(rung, 1);
     }
 
+    /** A rung that has no list yet is left alone for a while; longer each time. */
+    putOff(rung: number): void {
+        const one = this.#rungs[rung]!;
+        one.offMs = Math.min(2 * one.offMs || firstAbsentMs, longestAbsentMs);
+        one.putOffMs = performance.now() + one.offMs;
+    }
+
+    isPutOff(rung: number): boolean {
+        return performance.now() < this.#rungs[rung]!.putOffMs;
+    }
+
     listOf(rung: number): MediaPlaylist | null {
         return this.#rungs[rung]!.list;
     }
 
-    /** For how long the rung's list is good, in milliseconds: its end may not be known, but is not asked for all the time. */
+    /** For how long the rung's list is good, in milliseconds: its end may not be known, but is not asked for all the time. Longer each time
+     * that it could not be read. */
     goodForMs(rung: number): number {
-        const { list, readMs } = this.#rungs[rung]!;
-        return list ? Math.max(0, readMs + 500 * list.targetSeconds - performance.now()) : 0;
+        const { list, readMs, failures } = this.#rungs[rung]!;
+        if (!list) return 0;
+        const each = 500 * list.targetSeconds;
+        return Math.max(0, readMs + (failures > 1 ? Math.min(each * 2 ** (failures - 1), Math.max(each, longestAbsentMs)) : each) - performance.now());
     }
 
     /** Whether its server lets those wait who ask for what comes next, as far as is known. */
@@ -214,14 +242,30 @@ export class SegmentLists {
         try {
             const begun = performance.now();
             const { text, url: found } = await this.#fetch(url, signal, url === one.variant.url);
-            const read = readPlaylist(text, found);
-            if ('variants' in read) throw new SourceError('not-htvm', 'The playlist cannot be read: it names lists of lists.');
+            const list = readSegmentList(text, found);
             one.failures = 0;
-            this.#take(one, read.playlist, text.length);
+            this.#take(one, list, text.length);
             if (url === one.variant.url) one.readMs = begun;
         } catch (error) {
             one.readMs = performance.now();
             if (signal.aborted || !one.list || ++one.failures > mostFailures) throw error;
+            if (one.failures === tellingFailures) this.#notice('What comes next of the stream cannot be had at the moment. It is waited for.');
+        }
+    }
+
+    // Where nothing is yet, something may be soon: a stream that is about to begin, at a hub, or at a cache that asked too early.
+    async #await(url: string, signal: AbortSignal): Promise<{ text: string; url: string }> {
+        let ms = firstAbsentMs;
+        for (let waited = 0; ; waited += ms, ms = Math.min(2 * ms, longestAbsentMs)) {
+            try {
+                return await this.#fetch(url, signal);
+            } catch (error) {
+                const missing = error instanceof SourceError && error.code === 'missing';
+                if (!missing || waited >= mostAbsentMs) throw error;
+            }
+            if (waited === 0) this.#notice('The stream is not there yet. It is waited for.');
+            await pause(ms, signal);
+            if (signal.aborted) throw new Error('aborted');
         }
     }
 
@@ -287,6 +331,12 @@ export class SegmentLists {
     #beginOfNew(segment: Segment | null | undefined): number {
         return (segment && this.#begins.get(segment.number)) ?? this.#endUs;
     }
+}
+
+function readSegmentList(text: string, url: string): MediaPlaylist {
+    const read = readPlaylist(text, url);
+    if ('variants' in read) throw new SourceError('not-htvm', 'The playlist cannot be read: it names lists of lists.');
+    return read.playlist;
 }
 
 function endOf({ firstNumber, segments, open }: MediaPlaylist): Position {

@@ -8,17 +8,18 @@ import type { LadderReport } from './messages.js';
 import { timed } from './mp4_packets.js';
 import { SampleReader } from './mp4_samples.js';
 import { boxesOf, Fields, readFragment, readMovie, Samples, type Movie } from './mp4_tables.js';
-import { chooseRung, shouldGiveUp, type RungChoice } from './rung_choice.js';
-import { fetchFile, type Fetched, type Progress } from './segment_fetch.js';
+import { chooseRung, shouldGiveUp, Trials, type Measured, type RungChoice } from './rung_choice.js';
+import { fetchFile, pause, type Came, type Fetched, type Progress } from './segment_fetch.js';
 import { SegmentLists, type Piece, type Position } from './segment_list.js';
 import type { Place, StreamPackets, TimedPacket } from './stream_packets.js';
 
 const aheadSeconds = 4; // are fetched before they are decoded
 const keptToRise = 1.5; // seconds of a lower rung that are kept where the line brings much more
 const muchMore = 2;
-const ratesKept = 4;
+const measuresKept = 4;
 const leastBits = 8 * 16384; // that tell what the line brings,
-const mostMs = 400; // or fewer that took so long
+const mostMs = 400; // or fewer that took so long,
+const mostSeconds = 1; // or of so much of the stream
 const shareForLists = 0.2; // of what the line brings
 const surelyBackwards = 3; // lists in a row that end before what comes next
 const mapsKept = 8;
@@ -57,8 +58,9 @@ export class SegmentPackets implements StreamPackets {
     #shownUs = -Infinity; // of the segment that comes next, what is before this time was fetched in another rung
     #rung: number | null = null; // of the segment that was fetched last
     #tracks: Movie | null = null; // of the rung; null: its map is to be fetched
-    #rates: number[] = [];
-    #came = { bits: 0, ms: 0 }; // since the last rate
+    #measures: Measured[] = [];
+    #came = { bits: 0, bitsMs: 0, ms: 0, seconds: 0 }; // since the last of these
+    #trials = new Trials();
     #backwards = 0; // lists in a row that ended before what comes next
     #atMost = { number: -1, rung: 0 }; // of a segment that was given up in a higher rung
     #loaded: Loaded[] = [];
@@ -76,7 +78,7 @@ export class SegmentPackets implements StreamPackets {
     #decodeMs = 0; // a frame
 
     constructor(url: string, notice: (text: string) => void, report: (report: LadderReport) => void) {
-        this.#lists = new SegmentLists(url);
+        this.#lists = new SegmentLists(url, notice);
         this.#notice = notice;
         this.#report = report;
     }
@@ -277,7 +279,7 @@ export class SegmentPackets implements StreamPackets {
 
     // Whether the line bears that the list is read anew for each part.
     #takesParts(rung: number): boolean {
-        const line = this.#rates.at(-1);
+        const line = this.#measures.at(-1)?.bitsPerSecond;
         return line === undefined || this.#lists.bitsForParts(rung) <= shareForLists * line;
     }
 
@@ -291,6 +293,11 @@ export class SegmentPackets implements StreamPackets {
             return true;
         } catch (error) {
             if (signal.aborted || this.#lists.rungs.length === 1) throw error;
+            if (rung > 0 && error instanceof SourceError && error.code === 'missing') {
+                this.#lists.putOff(rung);
+                this.#beginAnew();
+                return false;
+            }
             this.#notice('One of the qualities of this stream cannot be read.');
             this.#lists.drop(rung);
             if (this.#rung !== null && this.#rung >= rung) this.#rung = null;
@@ -313,12 +320,18 @@ export class SegmentPackets implements StreamPackets {
         const last = this.#loaded.at(-1) ?? this.#current;
         const segmentSeconds = last?.piece.seconds ?? 2;
         this.#choice = chooseRung({
-            rungs, current: this.#rung, bitsPerSecond: this.#rates, aheadSeconds: this.#ahead, segmentSeconds,
-            decodeShare: (this.#decodeMs * 1000) / this.frameUs,
+            rungs, current: this.#rung, measured: this.#measures, aheadSeconds: this.#ahead, segmentSeconds,
+            decodeShare: (this.#decodeMs * 1000) / this.frameUs, restSeconds: this.#trials.restSeconds,
         });
-        if (this.#atMost.number === this.#next.number && this.#choice.rung > this.#atMost.rung) this.#choice.rung = this.#atMost.rung;
+        if (this.#atMost.number === this.#next.number && this.#choice.rung > this.#atMost.rung) this.#choice = { rung: this.#atMost.rung, reason: this.#choice.reason };
+        if (this.#lists.isPutOff(this.#choice.rung)) {
+            let { rung } = this.#choice;
+            while (rung > 0 && this.#lists.isPutOff(rung)) --rung;
+            this.#choice = { rung, reason: 'a finer quality is not there yet' };
+        }
+        this.#trials.chose(this.#choice);
         const { rung } = this.#choice;
-        if (this.#rung === null || rung <= this.#rung || this.#rates.at(-1)! < muchMore * rungs[rung]!) return;
+        if (this.#rung === null || rung <= this.#rung || this.#measures.at(-1)!.bitsPerSecond < muchMore * rungs[rung]!) return;
         // What waits in a lower rung is fetched again, but for what is shown soon.
         for (let waits = this.#loaded.at(-1); waits && waits.piece.part === null && waits.rung < rung; waits = this.#loaded.at(-1)) {
             if (this.#ahead - waits.piece.seconds < keptToRise) break;
@@ -350,12 +363,12 @@ export class SegmentPackets implements StreamPackets {
         if (signal.aborted) return;
         if (fetched.outcome === 'gone') return this.#leaveOut(piece);
         if (fetched.outcome === 'given up') {
-            this.#measured(fetched.bitsPerSecond);
+            this.#measured(fetched.bitsPerSecond, Infinity);
             this.#atMost = { number: piece.number, rung: rung - 1 };
             if (!begins) this.#beginAnew();
             return;
         }
-        this.#add(8 * fetched.bytes.length, fetched.ms);
+        this.#add(fetched.came, piece.seconds);
         try {
             if (!map && hasOtherTracks(fetched.bytes, this.#tracks!)) {
                 map = await this.#map(piece, signal);
@@ -432,16 +445,19 @@ export class SegmentPackets implements StreamPackets {
     }
 
     // Parts are small: several together tell what the line brings.
-    #add(bits: number, ms: number): void {
-        this.#came = { bits: this.#came.bits + bits, ms: this.#came.ms + ms };
-        if (this.#came.bits < leastBits && this.#came.ms < mostMs) return this.#tell();
-        this.#measured((1000 * this.#came.bits) / Math.max(this.#came.ms, 1));
+    #add({ bits, bitsMs, ms }: Came, seconds: number): void {
+        this.#trials.came(seconds);
+        const before = this.#came;
+        this.#came = { bits: before.bits + bits, bitsMs: before.bitsMs + bitsMs, ms: before.ms + ms, seconds: before.seconds + seconds };
+        const came = this.#came;
+        if (came.bits < leastBits && came.ms < mostMs && came.seconds < mostSeconds) return this.#tell();
+        this.#measured((1000 * came.bits) / Math.max(came.bitsMs, 1), came.ms / (1000 * Math.max(came.seconds, 0.001)));
     }
 
-    #measured(bitsPerSecond: number): void {
-        this.#came = { bits: 0, ms: 0 };
-        this.#rates.push(bitsPerSecond);
-        if (this.#rates.length > ratesKept) this.#rates.shift();
+    #measured(bitsPerSecond: number, share: number): void {
+        this.#came = { bits: 0, bitsMs: 0, ms: 0, seconds: 0 };
+        this.#measures.push({ bitsPerSecond, share });
+        if (this.#measures.length > measuresKept) this.#measures.shift();
         this.#tell();
     }
 
@@ -453,7 +469,7 @@ export class SegmentPackets implements StreamPackets {
     #tell(): void {
         const rungs = this.#lists.rungs.map(({ bitsPerSecond, resolution }) => ({ megabitsPerSecond: bitsPerSecond / 1e6, resolution }));
         const { rung, reason } = this.#choice;
-        const rate = this.#rates.at(-1);
+        const rate = this.#measures.at(-1)?.bitsPerSecond;
         this.#report({
             type: 'ladder', rungs, rung, reason, lineMegabitsPerSecond: rate === undefined ? null : rate / 1e6, secondsFetched: this.#ahead,
             lostSegments: this.#lost, live: this.#lists.live, joinUs: this.#lists.live ? this.#joinUs() : 0, zeroMs: this.#lists.zeroMs,
@@ -476,16 +492,4 @@ function hasOtherTracks(bytes: Uint8Array, { tracks }: Movie): boolean {
                 if (!tracks.some((track) => track.id === id)) return true;
             }
     return false;
-}
-
-function pause(milliseconds: number, signal: AbortSignal): Promise<void> {
-    return new Promise((resolve) => {
-        const end = (): void => {
-            clearTimeout(timer);
-            signal.removeEventListener('abort', end);
-            resolve();
-        };
-        const timer = setTimeout(end, milliseconds);
-        signal.addEventListener('abort', end);
-    });
 }
