@@ -71,6 +71,14 @@ for (const [what, lines, words] of [
 ])
     test(`parts ${what} are refused in words`, () => assert.throws(() => read(list(...lines)), words));
 
+test('the part that is announced is read, and what is announced of another kind, or as a part of a file, is passed over', () => {
+    const hint = (line) => read(list(...segments(1, 1), part('2.0'), line)).hint;
+    assert.equal(hint('#EXT-X-PRELOAD-HINT:TYPE=PART,URI="2.1"'), 'https://a.example/hls/anna/2.1');
+    assert.equal(hint('#EXT-X-PRELOAD-HINT:TYPE=MAP,URI="map"'), '');
+    assert.equal(hint('#EXT-X-PRELOAD-HINT:TYPE=PART,URI="2.m4s",BYTERANGE-START=0'), '');
+    assert.throws(() => hint('#EXT-X-PRELOAD-HINT:TYPE=PART,URI="file:///etc/passwd"'), /an address of another kind: file:/);
+});
+
 // ---- where playing begins -----------------------------------------------------------------------------------------------
 
 test('a stream in parts is joined as far behind its end as the list says', async () => {
@@ -126,6 +134,24 @@ test('what comes next is asked for by its place, and the list is there once that
     assert.equal(lists.endUs, 2.5e6);
 });
 
+test('the part that comes next is known by its address before it is listed, and no other', async () => {
+    const lists = await opened(list(...segments(10, 2), part('12.0'), '#EXT-X-PRELOAD-HINT:TYPE=PART,URI="12.1"'));
+    assert.equal(lists.announced(0, { number: 12, part: 1 }), 'https://a.example/hls/anna/12.1');
+    assert.equal(lists.announced(0, { number: 12, part: 0 }), null);
+    assert.equal(lists.announced(0, { number: 13, part: 0 }), null);
+});
+
+test('where three parts in a row were announced and did not come, that is not believed any more', async () => {
+    const lists = await opened(list(...segments(10, 2), part('12.0'), '#EXT-X-PRELOAD-HINT:TYPE=PART,URI="12.1"'));
+    const known = () => lists.announced(0, { number: 12, part: 1 }) !== null;
+    for (const came of [false, false, true, false, false]) {
+        lists.announcedCame(0, came);
+        assert.ok(known());
+    }
+    lists.announcedCame(0, false);
+    assert.equal(known(), false);
+});
+
 test('who does not take parts has the segment once it is whole, and asks for that', async () => {
     const lists = await opened(list(...segments(10, 2), part('12.0')));
     assert.equal(lists.piece(0, { number: 12, part: 0 }, false), null);
@@ -139,6 +165,19 @@ test('what it takes to read the list for each part is known by its length', asyn
     const text = list(...segments(10, 2), part('12.0'));
     assert.equal((await opened(text)).bitsForParts(0), 8 * text.length * 4);
     assert.equal((await opened(['#EXTM3U', '#EXT-X-MAP:URI="map"', ...segments(10, 2)].join('\n'))).bitsForParts(0), 0);
+});
+
+test('a list that is compressed takes a third of that', async () => {
+    const text = list(...segments(10, 2), part('12.0'));
+    const { fetch: plain } = globalThis;
+    globalThis.fetch = async () => new Response(text, { headers: { 'Content-Encoding': 'gzip' } });
+    try {
+        const lists = new parts.SegmentLists(base);
+        await lists.open(signal);
+        assert.equal(lists.bitsForParts(0), (8 * text.length * 4) / 3);
+    } finally {
+        globalThis.fetch = plain;
+    }
 });
 
 test('the query of a link is kept', async () => {

@@ -83,10 +83,16 @@ test('a viewer has each frame once, part by part, and goes up to the finer rung'
     publish('berta');
     await there(`${hub}/hls/berta/master.m3u8`);
     const asked = [];
+    const listed = new Set(); // names of parts, as far as lists that came have them
+    const ahead = []; // parts that were asked for before
     const { fetch: plain } = globalThis;
-    globalThis.fetch = (url, more) => {
+    globalThis.fetch = async (url, more) => {
         asked.push(String(url));
-        return plain(url, more);
+        const name = String(url).split('/').at(-1);
+        if (/\.\d+\.m4s$/.test(name) && !listed.has(name)) ahead.push(name);
+        const response = await plain(url, more);
+        if (/\.m3u8/.test(url)) for (const [, one] of (await response.clone().text()).matchAll(/^#EXT-X-PART:.*URI="([^"]+)"/gm)) listed.add(one);
+        return response;
     };
     const notices = [];
     // Frames are taken as a player does that has something ahead, however fast the machine encodes: some for each part that comes.
@@ -122,6 +128,7 @@ test('a viewer has each frame once, part by part, and goes up to the finer rung'
         const parts = asked.filter((url) => /\/\d+-[0-9a-f]{8}\.\d+\.m4s$/.test(url));
         assert.ok(parts.length > 8, `${parts.length} parts`);
         assert.equal(new Set(parts).size, parts.length, 'each is asked for once');
+        assert.ok(ahead.length > 4, `${ahead.length} parts were asked for before they were listed`);
         assert.ok(asked.some((url) => /_HLS_msn=\d+&_HLS_part=\d+/.test(url)));
     } finally {
         clearInterval(atTheEnd);

@@ -60,7 +60,7 @@ test('a playlist tells the segments, their maps, numbers and times, and whether 
     const text = list('#EXT-X-MEDIA-SEQUENCE:7', '#EXT-X-MAP:URI="map.mp4"', '#EXTINF:2.000000,', 'a.m4s', '#EXTINF:1.5,', '../b.m4s', '#EXT-X-ENDLIST');
     const { playlist } = parts.readPlaylist(text, base);
     assert.deepEqual(playlist, {
-        targetSeconds: 2, firstNumber: 7, ended: true, open: null, partSeconds: 0, partHoldBack: 0, canWait: false,
+        targetSeconds: 2, firstNumber: 7, ended: true, open: null, partSeconds: 0, partHoldBack: 0, hint: '', canWait: false,
         segments: [
             { number: 7, url: 'https://a.example/live/a.m4s', mapUrl: 'https://a.example/live/map.mp4', seconds: 2, parts: [], dateMs: null },
             { number: 8, url: 'https://a.example/b.m4s', mapUrl: 'https://a.example/live/map.mp4', seconds: 1.5, parts: [], dateMs: null },

@@ -214,3 +214,11 @@ test('a hub that is back before its publishers takes no playlist away', async ()
     await grownOld();
     assert.deepEqual(await playlist('clara'), { status: 200, cache: 'STALE', text: 'the last one' });
 });
+
+test('playlists are compressed, and pages of other sites may know it', async () => {
+    hub.lists.set('dora', '#EXTM3U\n'.padEnd(4000, '#EXT-X-PART\n'));
+    const response = await fetch(`http://127.0.0.1:${edgePort}/hls/dora/stream.m3u8`, { headers: { 'Accept-Encoding': 'gzip' } });
+    assert.equal(response.headers.get('content-encoding'), 'gzip');
+    assert.match(response.headers.get('access-control-expose-headers'), /Content-Encoding/);
+    assert.equal((await response.text()).length, 4000);
+});

@@ -36,6 +36,8 @@ export interface MediaPlaylist {
     partSeconds: number;
     /** How far behind the end of the last part players are to stay; 0: not told. */
     partHoldBack: number;
+    /** The part that comes next, which who asks for it gets once it is there; '': not told. */
+    hint: string;
     /** The server says that who asks for what comes next gets the list once it is there. */
     canWait: boolean;
 }
@@ -86,7 +88,7 @@ function readVariants(lines: string[], base: string): Variant[] {
 }
 
 function readSegments(lines: string[], base: string): MediaPlaylist {
-    const out: MediaPlaylist = { targetSeconds: 0, segments: [], firstNumber: 0, ended: false, open: null, partSeconds: 0, partHoldBack: 0, canWait: false };
+    const out: MediaPlaylist = { targetSeconds: 0, segments: [], firstNumber: 0, ended: false, open: null, partSeconds: 0, partHoldBack: 0, hint: '', canWait: false };
     let seconds: number | null = null;
     let [mapUrl, dateMs, parts] = ['', null as number | null, [] as Part[]];
     const add = (url: string, lasts: number): Segment => {
@@ -107,6 +109,7 @@ function readSegments(lines: string[], base: string): MediaPlaylist {
             if (attributes.has('BYTERANGE')) throw lies('it has maps that are parts of files, which are not read here');
             mapUrl = addressOf(attributes.get('URI') ?? '', base);
         } else if (line.startsWith('#EXT-X-PART:')) parts.push(partOf(line, base, parts.length));
+        else if (line.startsWith('#EXT-X-PRELOAD-HINT:')) out.hint = hintIn(line, base) ?? out.hint;
         else if (line.startsWith('#EXT-X-PART-INF:')) out.partSeconds = numberIn(attributesOf(line).get('PART-TARGET') ?? '', 'PART-TARGET', longestSeconds);
         else if (line.startsWith('#EXT-X-SERVER-CONTROL:')) {
             const attributes = attributesOf(line);
@@ -132,6 +135,13 @@ function partOf(line: string, base: string, before: number): Part {
     if (attributes.has('BYTERANGE')) throw lies('it has parts that are parts of files, which are not read here');
     if (before >= mostParts) throw lies('a segment has more parts than are taken');
     return { url: addressOf(attributes.get('URI') ?? '', base), seconds: numberIn(attributes.get('DURATION') ?? '', 'the DURATION of a part', longestSeconds) };
+}
+
+// Null of what is no part, or a part of a file.
+function hintIn(line: string, base: string): string | null {
+    const attributes = attributesOf(line);
+    if (attributes.get('TYPE') !== 'PART' || attributes.has('BYTERANGE-START')) return null;
+    return addressOf(attributes.get('URI') ?? '', base);
 }
 
 // Players do without a date that is none.

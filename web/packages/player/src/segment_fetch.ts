@@ -26,7 +26,7 @@ export interface Came {
 }
 
 export type Fetched =
-    | { outcome: 'here'; bytes: Uint8Array; came: Came; url: string }
+    | { outcome: 'here'; bytes: Uint8Array; came: Came; url: string; isCompressed: boolean }
     /** The server does not have it. */
     | { outcome: 'gone' }
     | { outcome: 'given up'; bitsPerSecond: number };
@@ -34,6 +34,8 @@ export type Fetched =
 export interface FetchOptions {
     /** Asked now and then whether to go on. */
     giveUp?: (progress: Progress) => boolean;
+    /** Called when the answer begins. */
+    begins?: () => void;
     /** The browser's own copy is not enough. */
     fresh?: boolean;
     /** Whether to try again where the server fails or no connection comes about. */
@@ -41,11 +43,11 @@ export interface FetchOptions {
 }
 
 /** The file. Throws where no connection comes about, and where the signal aborts. */
-export async function fetchFile(url: string, signal: AbortSignal, { giveUp, fresh = false, again = true }: FetchOptions = {}): Promise<Fetched> {
+export async function fetchFile(url: string, signal: AbortSignal, { giveUp, begins, fresh = false, again = true }: FetchOptions = {}): Promise<Fetched> {
     const retries = again ? retriesMs.length : 0;
     for (let attempt = 0; ; ++attempt) {
         try {
-            const fetched = await tryToFetch(url, signal, giveUp, fresh);
+            const fetched = await tryToFetch(url, signal, giveUp, begins, fresh);
             if (fetched) return fetched;
             if (attempt >= retries) return { outcome: 'gone' };
         } catch (error) {
@@ -59,7 +61,9 @@ export async function fetchFile(url: string, signal: AbortSignal, { giveUp, fres
 }
 
 // Null where it is worth trying again.
-async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: Progress) => boolean) | undefined, fresh: boolean): Promise<Fetched | null> {
+async function tryToFetch(
+    url: string, signal: AbortSignal, giveUp: FetchOptions['giveUp'], begins: FetchOptions['begins'], fresh: boolean,
+): Promise<Fetched | null> {
     const begin = performance.now();
     const abort = new AbortController();
     const stop = (): void => abort.abort();
@@ -82,11 +86,13 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
     try {
         const response = await fetch(url, { signal: abort.signal, cache: fresh ? 'no-cache' : 'default' });
         begun = performance.now();
+        begins?.();
         marks.splice(0, marks.length, { at: begun, bytes: 0 });
         if (response.status === 404 || response.status === 410) return { outcome: 'gone' };
         if (!response.ok) return null;
         const length = Number(response.headers.get('Content-Length') ?? NaN);
-        if (length > 0 && !response.headers.get('Content-Encoding')) total = length;
+        const isCompressed = (response.headers.get('Content-Encoding') ?? 'identity') !== 'identity';
+        if (length > 0 && !isCompressed) total = length;
         const parts: Uint8Array[] = [];
         let first: { at: number; bytes: number } | null = null;
         let last = begun;
@@ -112,7 +118,7 @@ async function tryToFetch(url: string, signal: AbortSignal, giveUp: ((progress: 
         const ms = performance.now() - begun;
         const ran = first && last - first.at >= runningMs && bytes - first.bytes >= bytes / 2;
         const came = ran ? { ms, bits: 8 * (bytes - first!.bytes), bitsMs: last - first!.at } : { ms, bits: 8 * bytes, bitsMs: ms };
-        return { outcome: 'here', bytes: whole, came, url: response.url || url };
+        return { outcome: 'here', bytes: whole, came, url: response.url || url, isCompressed };
     } catch (error) {
         if (givenUp > 0) return { outcome: 'given up', bitsPerSecond: givenUp };
         throw error;

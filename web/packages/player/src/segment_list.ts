@@ -14,14 +14,15 @@ const firstAbsentMs = 1000; // until what is not there is asked for again; then 
 const longestAbsentMs = 8000;
 const mostAbsentMs = 60000; // in all
 const mostVain = 3; // in a row, of answers that do not have what was asked for
+const compressedBy = 3; // lists, where they are, or more
 const mostDated = 100; // segments of a list whose dates are looked at
 const waitTargets = 4; // for so many target durations a server may let those wait who ask for what comes next
 
 interface Rung {
     variant: Variant;
     list: MediaPlaylist | null;
-    /** How long the list is. */
-    letters: number;
+    /** How long the list is on its way, nearly. */
+    bytes: number;
     readMs: number;
     failures: number;
     /** It is not there, and is not asked for again before: performance.now(). */
@@ -34,6 +35,15 @@ interface Rung {
     vain: number;
     /** The server does not answer who asks for what comes next. */
     doesNotWait: boolean;
+    /** Parts in a row that were announced and did not come. */
+    brokenHints: number;
+}
+
+interface Answer {
+    text: string;
+    url: string;
+    /** Of bytes that came, nearly. */
+    size: number;
 }
 
 /** What is fetched next: a segment, or from this part on what there is of it. */
@@ -89,19 +99,19 @@ export class SegmentLists {
     /** Reads what is at the address: a playlist, or a list of playlists and the lowest of these. Where nothing is, it is waited for. */
     async open(signal: AbortSignal): Promise<void> {
         if (this.#rungs.length > 0 && this.#rungs[0]!.list) return;
-        const { text, url } = await this.#await(this.#url, signal);
+        const { text, url, size } = await this.#await(this.#url, signal);
         const read = readPlaylist(text, url);
         const rung = (variant: Variant): Rung => ({
-            variant, list: null, letters: 0, readMs: 0, failures: 0, putOffMs: 0, offMs: 0, shift: 0, vain: 0, doesNotWait: false,
+            variant, list: null, bytes: 0, readMs: 0, failures: 0, putOffMs: 0, offMs: 0, shift: 0, vain: 0, doesNotWait: false, brokenHints: 0,
         });
         if ('variants' in read) {
             this.#rungs = read.variants.map(rung);
             const lowest = this.#rungs[0]!;
-            const { text: itsText, url: itsUrl } = await this.#await(lowest.variant.url, signal);
-            this.#take(lowest, readSegmentList(itsText, itsUrl), itsText.length);
+            const its = await this.#await(lowest.variant.url, signal);
+            this.#take(lowest, readSegmentList(its.text, its.url), its.size);
         } else {
             this.#rungs = [rung({ url: this.#url, bitsPerSecond: 0, resolution: '', codecs: '' })];
-            this.#take(this.#rungs[0]!, read.playlist, text.length);
+            this.#take(this.#rungs[0]!, read.playlist, size);
         }
         const { list } = this.#rungs[0]!;
         if (list!.ended && list!.segments.length === 0) throw new SourceError('empty', 'The playlist names no segment.');
@@ -183,10 +193,25 @@ export class SegmentLists {
         return has;
     }
 
+    /** The address of the part at that position, where it comes next and the rung's list announces it; null where not, or where what was
+     * announced did not come. */
+    announced(rung: number, { number, part }: Position): string | null {
+        const { list, brokenHints } = this.#rungs[rung]!;
+        if (!list || !list.hint || !this.waits(rung) || brokenHints >= mostVain) return null;
+        const end = endOf(list);
+        return end.number === number && end.part === part ? list.hint : null;
+    }
+
+    /** Whether a part came that was announced. */
+    announcedCame(rung: number, came: boolean): void {
+        const one = this.#rungs[rung];
+        if (one) one.brokenHints = came ? 0 : one.brokenHints + 1;
+    }
+
     /** Bits a second that it takes to read the list anew for each part. */
     bitsForParts(rung: number): number {
-        const { list, letters } = this.#rungs[rung]!;
-        return list && list.partSeconds > 0 ? (8 * letters) / list.partSeconds : 0;
+        const { list, bytes } = this.#rungs[rung]!;
+        return list && list.partSeconds > 0 ? (8 * bytes) / list.partSeconds : 0;
     }
 
     /** The piece to fetch there; 'over': the segment has no further part; null: the list has none. inParts: of a segment that is not
@@ -241,10 +266,10 @@ export class SegmentLists {
     async #readAt(one: Rung, url: string, signal: AbortSignal): Promise<void> {
         try {
             const begun = performance.now();
-            const { text, url: found } = await this.#fetch(url, signal, url === one.variant.url);
+            const { text, url: found, size } = await this.#fetch(url, signal, url === one.variant.url);
             const list = readSegmentList(text, found);
             one.failures = 0;
-            this.#take(one, list, text.length);
+            this.#take(one, list, size);
             if (url === one.variant.url) one.readMs = begun;
         } catch (error) {
             one.readMs = performance.now();
@@ -254,7 +279,7 @@ export class SegmentLists {
     }
 
     // Where nothing is yet, something may be soon: a stream that is about to begin, at a hub, or at a cache that asked too early.
-    async #await(url: string, signal: AbortSignal): Promise<{ text: string; url: string }> {
+    async #await(url: string, signal: AbortSignal): Promise<Answer> {
         let ms = firstAbsentMs;
         for (let waited = 0; ; waited += ms, ms = Math.min(2 * ms, longestAbsentMs)) {
             try {
@@ -269,14 +294,15 @@ export class SegmentLists {
         }
     }
 
-    async #fetch(url: string, signal: AbortSignal, again = true): Promise<{ text: string; url: string }> {
+    async #fetch(url: string, signal: AbortSignal, again = true): Promise<Answer> {
         const fetched = await fetchFile(url, signal, { fresh: true, again });
         if (fetched.outcome !== 'here') throw new SourceError('missing', `There is no playlist at ${url}.`);
-        return { text: new TextDecoder().decode(fetched.bytes), url: fetched.url };
+        const { bytes, url: found, isCompressed } = fetched;
+        return { text: new TextDecoder().decode(bytes), url: found, size: bytes.length / (isCompressed ? compressedBy : 1) };
     }
 
-    #take(one: Rung, list: MediaPlaylist, letters: number): void {
-        one.letters = letters;
+    #take(one: Rung, list: MediaPlaylist, size: number): void {
+        one.bytes = size;
         one.readMs = performance.now();
         one.shift = this.#shiftOf(list) ?? one.shift;
         if (one.shift !== 0) {

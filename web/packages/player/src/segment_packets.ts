@@ -22,11 +22,23 @@ const mostMs = 400; // or fewer that took so long,
 const mostSeconds = 1; // or of so much of the stream
 const shareForLists = 0.2; // of what the line brings
 const surelyBackwards = 3; // lists in a row that end before what comes next
+const answeredMs = 100; // for an announced part to be answered, once it is listed
 const mapsKept = 8;
 const mostUnreachable = 3; // segments in a row that do not come, before the stream counts as unreachable
 const freshenMs = 150; // a cache's first answer may be as old as its last viewer's: so soon the list is read again
 const gapUs = 100000; // from here on time between two segments is left out
 const mendedUs = 1e6; // by which a segment's own time may differ from the list's
+
+/** A part that was asked for before the list had it. */
+interface Announced {
+    url: string;
+    rung: number;
+    /** Its answer has begun. */
+    isBegun: boolean;
+    /** null: it did not come. */
+    fetched: Promise<Fetched | null>;
+    abort: AbortController;
+}
 
 /** A segment that was fetched, or a part of one. */
 interface Loaded {
@@ -62,6 +74,7 @@ export class SegmentPackets implements StreamPackets {
     #came = { bits: 0, bitsMs: 0, ms: 0, seconds: 0 }; // since the last of these
     #trials = new Trials();
     #backwards = 0; // lists in a row that ended before what comes next
+    #announced: Announced | null = null;
     #atMost = { number: -1, rung: 0 }; // of a segment that was given up in a higher rung
     #loaded: Loaded[] = [];
     #lost = 0; // segments, all or in part
@@ -109,6 +122,7 @@ export class SegmentPackets implements StreamPackets {
         const place = this.#lists.placeAt(rung, joins ? null : soughtUs);
         this.#goTo(place.number);
         this.#loaded = [];
+        this.#announced = null;
         this.#ready = [];
         this.#current = null;
         this.#endUs = null;
@@ -266,6 +280,7 @@ export class SegmentPackets implements StreamPackets {
 
     // Until the rung's list may know what comes next.
     async #awaitList(rung: number, signal: AbortSignal): Promise<void> {
+        this.#askForAnnounced(rung, signal);
         // A list that does not know of it at all may be an old one, of a cache that nobody has asked for a while.
         if (this.#lists.waits(rung) && (await this.#lists.waitFor(rung, this.#next, this.#takesParts(rung), signal))) return;
         await pause(Math.max(this.#lists.goodForMs(rung), 100), signal);
@@ -329,7 +344,6 @@ export class SegmentPackets implements StreamPackets {
             while (rung > 0 && this.#lists.isPutOff(rung)) --rung;
             this.#choice = { rung, reason: 'a finer quality is not there yet' };
         }
-        this.#trials.chose(this.#choice);
         const { rung } = this.#choice;
         if (this.#rung === null || rung <= this.#rung || this.#measures.at(-1)!.bitsPerSecond < muchMore * rungs[rung]!) return;
         // What waits in a lower rung is fetched again, but for what is shown soon.
@@ -347,19 +361,13 @@ export class SegmentPackets implements StreamPackets {
         // All of a segment whose first parts are here.
         if (piece.part === null && this.#next.part > 0) this.#beginAnew();
         const begins = piece.part === null || piece.part === 0;
+        if (begins) this.#trials.chose(this.#choice);
         const anew = begins && (this.#tracks === null || rung !== this.#rung);
         if (!begins && this.#tracks === null) return this.#leaveOut(piece);
         let map = anew ? await this.#map(piece, signal) : null;
         if (signal.aborted) return;
         if (anew && !map) return this.#leaveOut(piece);
-        const expectedBytes = (this.#lists.rungs[rung]!.bitsPerSecond * piece.seconds) / 8;
-        const lowestBits = (this.#lists.rungs[0]?.bitsPerSecond ?? 0) * piece.seconds;
-        const giveUp = ({ bytes, total, bitsPerSecond }: Progress): boolean =>
-            shouldGiveUp({
-                bitsLeft: Math.max(8 * ((total ?? expectedBytes) - bytes), 1), bitsPerSecond, rung, lowestBits,
-                aheadSeconds: this.#ahead, segmentSeconds: piece.seconds,
-            });
-        const fetched = await this.#fetchPiece(piece, signal, giveUp);
+        const fetched = await this.#fetchPiece(piece, signal, this.#givesUp(rung, piece.seconds));
         if (signal.aborted) return;
         if (fetched.outcome === 'gone') return this.#leaveOut(piece);
         if (fetched.outcome === 'given up') {
@@ -393,10 +401,52 @@ export class SegmentPackets implements StreamPackets {
         this.#tell();
     }
 
+    // Whether to give a segment or a part up, while it comes.
+    #givesUp(rung: number, seconds: number): (progress: Progress) => boolean {
+        const expectedBytes = (this.#lists.rungs[rung]!.bitsPerSecond * seconds) / 8;
+        const lowestBits = (this.#lists.rungs[0]?.bitsPerSecond ?? 0) * seconds;
+        return ({ bytes, total, bitsPerSecond }) =>
+            shouldGiveUp({
+                bitsLeft: Math.max(8 * ((total ?? expectedBytes) - bytes), 1), bitsPerSecond, rung, lowestBits, aheadSeconds: this.#ahead, segmentSeconds: seconds,
+            });
+    }
+
+    // What comes next, where the list says how it will be called: so it comes when it is there, and not after the list that has it.
+    #askForAnnounced(rung: number, signal: AbortSignal): void {
+        const url = this.#takesParts(rung) ? this.#lists.announced(rung, this.#next) : null;
+        if (!url || this.#announced?.url === url) return;
+        this.#announced?.abort.abort();
+        const abort = new AbortController();
+        const stop = (): void => abort.abort();
+        signal.addEventListener('abort', stop);
+        const usual = this.#givesUp(rung, this.#lists.listOf(rung)!.partSeconds);
+        const giveUp = (progress: Progress): boolean => announced.isBegun && usual(progress);
+        const begins = (): void => void (announced.isBegun = true);
+        const fetched = fetchFile(url, abort.signal, { giveUp, begins, again: false })
+            .then((one) => (one.outcome === 'gone' ? null : one), () => null)
+            .finally(() => signal.removeEventListener('abort', stop));
+        const announced: Announced = { url, rung, isBegun: false, fetched, abort };
+        this.#announced = announced;
+    }
+
+    // The part, where it was asked for before. One that is not answered soon although it is listed is asked for once more: a cache may let
+    // those wait for long who ask for what another has asked for.
+    async #takeAnnounced(url: string, signal: AbortSignal): Promise<Fetched | null> {
+        const announced = this.#announced;
+        this.#announced = null;
+        if (!announced) return null;
+        if (announced.url === url && !announced.isBegun) await Promise.race([announced.fetched, pause(answeredMs, announced.abort.signal)]);
+        if (announced.url !== url || !announced.isBegun) announced.abort.abort();
+        if (announced.url !== url) return null;
+        const fetched = await announced.fetched;
+        if (!signal.aborted) this.#lists.announcedCame(announced.rung, fetched !== null);
+        return fetched;
+    }
+
     // Where a connection breaks again and again, it may be this segment's fault alone.
     async #fetchPiece({ url }: Piece, signal: AbortSignal, giveUp: (progress: Progress) => boolean): Promise<Fetched> {
         try {
-            const fetched = await fetchFile(url, signal, { giveUp });
+            const fetched = (await this.#takeAnnounced(url, signal)) ?? (await fetchFile(url, signal, { giveUp }));
             this.#unreachable = 0;
             return fetched;
         } catch (error) {
