@@ -79,7 +79,7 @@ test('rungs of a ladder that is published are cut alike, and the hub lists them'
     for (const number of both) assert.equal(first.get(number), second.get(number));
 });
 
-test('a viewer has each frame once, part by part, and goes up to the finer rung', options, async () => {
+test('a viewer has each frame once, part by part, and goes up to the finest rung that is there', options, async () => {
     publish('berta');
     await there(`${hub}/hls/berta/master.m3u8`);
     const asked = [];
@@ -91,6 +91,7 @@ test('a viewer has each frame once, part by part, and goes up to the finer rung'
         const name = String(url).split('/').at(-1);
         if (/\.\d+\.m4s$/.test(name) && !listed.has(name)) ahead.push(name);
         const response = await plain(url, more);
+        if (/master\.m3u8/.test(url)) return new Response(`${await response.text()}#EXT-X-STREAM-INF:BANDWIDTH=99000000,AVERAGE-BANDWIDTH=400000\n../berta~3/stream.m3u8\n`);
         if (/\.m3u8/.test(url)) for (const [, one] of (await response.clone().text()).matchAll(/^#EXT-X-PART:.*URI="([^"]+)"/gm)) listed.add(one);
         return response;
     };
@@ -128,6 +129,8 @@ test('a viewer has each frame once, part by part, and goes up to the finer rung'
         const parts = asked.filter((url) => /\/\d+-[0-9a-f]{8}\.\d+\.m4s$/.test(url));
         assert.ok(parts.length > 8, `${parts.length} parts`);
         assert.equal(new Set(parts).size, parts.length, 'each is asked for once');
+        const vain = asked.filter((url) => url.endsWith('berta~3/stream.m3u8')).length;
+        assert.ok(vain >= 1 && vain < 12, `a finer rung that is not there was asked for ${vain} times`);
         assert.ok(ahead.length > 4, `${ahead.length} parts were asked for before they were listed`);
         assert.ok(asked.some((url) => /_HLS_msn=\d+&_HLS_part=\d+/.test(url)));
     } finally {
