@@ -61,3 +61,28 @@ test('bytes that come at once, or nearly so, are measured with all of their answ
 test('a small rest that comes late says nothing of the line', async () => {
     assert.deepEqual(await cameOf(10, [[20, 9000], [100, 1000]]), { ms: 120, bits: 80000, bitsMs: 120 });
 });
+
+test('whether to give up is not asked before an answer has run for 0.3 s, however long it was waited for', async () => {
+    clock = 1000;
+    const asked = [];
+    globalThis.fetch = async () => {
+        clock += 5000;
+        const body = new ReadableStream({
+            async pull(controller) {
+                // Ticks of the look come by the real clock; that of the transfer stands still but for these steps.
+                await new Promise((resolve) => setTimeout(resolve, 150));
+                clock += 200;
+                controller.enqueue(new Uint8Array(100));
+                if (clock > 6900) controller.close();
+            },
+        }, { highWaterMark: 0 });
+        return new Response(body);
+    };
+    const giveUp = ({ bytes }) => {
+        asked.push([clock - 6000, bytes]);
+        return false;
+    };
+    assert.equal((await fetchFile(address, signal, { giveUp })).outcome, 'here');
+    assert.ok(asked.length > 0);
+    for (const [ms, bytes] of asked) assert.ok(ms >= 300 && bytes >= 100, `${ms} ms, ${bytes} bytes`);
+});

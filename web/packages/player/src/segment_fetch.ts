@@ -79,7 +79,7 @@ async function tryToFetch(
     const look = setInterval(() => {
         const bitsPerSecond = rate();
         marks.push({ at: performance.now(), bytes });
-        if (performance.now() - begin < (begun === null ? leastSilentMs : leastMs) || !giveUp?.({ bytes, total, bitsPerSecond })) return;
+        if (performance.now() - (begun ?? begin) < (begun === null ? leastSilentMs : leastMs) || !giveUp?.({ bytes, total, bitsPerSecond })) return;
         givenUp = Math.max(bitsPerSecond, 1);
         abort.abort();
     }, lookEveryMs);
