@@ -70,7 +70,8 @@ async function listening(attributes, body) {
 }
 
 // Plays for some seconds and compares each click with the pictures at the time at which it is heard. Gives the clicks' media
-// times.
+// times. A machine that stands still for a moment displaces a click, but sound that is out of step displaces them all: so the
+// middle one of how far they are off counts.
 async function inStep(page, seconds, rate = 1) {
     const { clicks, pictures, latency } = await page.evaluate(async (time) => {
         listen.clicks.length = listen.pictures.length = 0;
@@ -78,6 +79,7 @@ async function inStep(page, seconds, rate = 1) {
         return { clicks: [...listen.clicks], pictures: [...listen.pictures], latency: listen.latency };
     }, seconds);
     const media = [];
+    const offs = [];
     for (const click of clicks) {
         const after = pictures.findIndex(({ context }) => context >= click + latency);
         if (after < 1) continue;
@@ -86,9 +88,10 @@ async function inStep(page, seconds, rate = 1) {
         const heard = a.media + (click + latency - a.context) * rate;
         const meant = 0.25 + 0.5 * Math.round((heard - 0.25) / 0.5);
         media.push(meant);
-        const off = (heard - meant) / rate;
-        assert.ok(Math.abs(off) < mostSeconds, `the click of ${meant} s is heard ${off.toFixed(3)} s off`);
+        offs.push((heard - meant) / rate);
     }
+    const middle = [...offs].sort((a, b) => Math.abs(a) - Math.abs(b))[(offs.length - 1) >> 1] ?? 0;
+    assert.ok(Math.abs(middle) < mostSeconds, `clicks of ${media} s are heard ${offs.map((off) => off.toFixed(3))} s off`);
     // The frame shown is the one of the media time, give or take what drawing takes.
     const behind = pictures.map((picture) => picture.media - picture.frame).sort((a, b) => a - b);
     assert.ok(Math.abs(behind[behind.length >> 1]) < 1 / 30 + mostSeconds, `frames are ${behind[behind.length >> 1]} s behind`);
