@@ -22,7 +22,7 @@ htvm_floor(container DIRECTORY src/container LINKS htvm_decoder)
 # Above the encoder's surface: pictures of a capture's texture in the layout of a stream's charts.
 htvm_floor(texture_baking SOURCES src/texture/texture_baking.cpp src/texture/surface_matches.cpp
   src/texture/film_picture.cpp LINKS htvm_core htvm_surface)
-htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
+htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen htvm_nanoflann embree PNG::PNG)
 
 # Draco-coded I-frames: plugs into the encoder and the decoder, which do not depend on libdraco.
 file(GLOB draco_sources CONFIGURE_DEPENDS src/codec/draco/*.cpp)

@@ -7,6 +7,7 @@ foreach(name tl nanoflann.hpp nlohmann)
     file(CREATE_LINK /usr/include/${name} ${host_headers}/include/${name} SYMBOLIC)
   endif()
 endforeach()
+set(NANOFLANN_INCLUDE ${host_headers}/include CACHE PATH "Made by cmake/toolchains/host_headers.cmake")
 file(WRITE ${host_headers}/lib/cmake/tl-expected/tl-expected-config.cmake
 "if(NOT TARGET tl::expected)
   add_library(tl::expected INTERFACE IMPORTED)

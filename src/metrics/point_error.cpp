@@ -30,6 +30,7 @@ using Tree =
 // slightly wider than the best distance, so that branches with an equally near point are not pruned.
 struct NearestWithLowestIndex {
     using DistanceType = double;
+    using IndexType = std::uint32_t;
     double squared_distance = std::numeric_limits<double>::infinity();
     std::uint32_t index = std::numeric_limits<std::uint32_t>::max();
 
@@ -42,6 +43,7 @@ struct NearestWithLowestIndex {
     }
     double worstDist() const { return squared_distance * (1 + 1e-9) + std::numeric_limits<double>::min(); }
     bool full() const { return true; }
+    void sort() {}  // nanoflann from 1.5 on asks for it
 };
 
 }  // namespace
@@ -57,7 +59,7 @@ std::vector<std::uint32_t> nearest_vertices(std::span<const Vector3f> from, std:
         for (std::size_t i = begin; i < end; ++i) {
             const std::array<double, 3> query{from[i][0], from[i][1], from[i][2]};
             NearestWithLowestIndex best;
-            tree.findNeighbors(best, query.data(), nanoflann::SearchParams());
+            tree.findNeighbors(best, query.data(), {});
             nearest[i] = best.index;
         }
     });

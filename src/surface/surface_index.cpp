@@ -48,7 +48,8 @@ NearestPoints::~NearestPoints() = default;
 
 Neighbour NearestPoints::nearest(const Point3f& query) const {
     Neighbour out;
-    tree_->index->knnSearch(query.data(), 1, &out.index, &out.squared_distance);
+    // How many it finds is known, which newer versions of nanoflann want to be said.
+    static_cast<void>(tree_->index->knnSearch(query.data(), 1, &out.index, &out.squared_distance));
     return out;
 }
 

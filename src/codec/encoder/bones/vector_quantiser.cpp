@@ -59,7 +59,7 @@ public:
                                             static_cast<float>(e[2]), 0.0f};
         std::size_t index = 0;
         float distance = 0;
-        tree_->knnSearch(query.data(), 1, &index, &distance);
+        static_cast<void>(tree_->knnSearch(query.data(), 1, &index, &distance));  // one, always
         return {index, distance};
     }
 
