@@ -80,6 +80,8 @@ set_tests_properties(real_captures command_line captures PROPERTIES COST 90)
 add_test(NAME c_examples COMMAND ${PROJECT_SOURCE_DIR}/tests/c_api/examples.sh $<TARGET_FILE:example_encode>
                                  $<TARGET_FILE:example_decode> ${PROJECT_SOURCE_DIR}/tests/data/conformance)
 add_test(NAME pages COMMAND ${PROJECT_SOURCE_DIR}/tests/install/pages.sh $<TARGET_FILE:htvm> $<TARGET_FILE:htvm-lab>)
+# What htvm is built from stands in four places.
+add_test(NAME needs COMMAND ${PROJECT_SOURCE_DIR}/tests/install/needs.py)
 # Every link in the documents leads to a file and a heading.
 add_test(NAME docs_links COMMAND ${PROJECT_SOURCE_DIR}/tests/docs/links.py ${PROJECT_SOURCE_DIR})
 # The dashboard and the alerts ask for what hubs count.
