@@ -21,7 +21,7 @@ export interface DecoderOptions {
     maxTriangles?: number;
     /** Likewise packets of more bytes. */
     maxPacketBytes?: number;
-    /** Bytes that one decoder may work with, 256 MB unless given. The module's memory ends at 512 MB. */
+    /** Bytes that one decoder may work with, 384 MB unless given, by a bound well above what frames take. The module's memory ends at 512 MB. */
     maxMemory?: number;
 }
 
@@ -299,7 +299,7 @@ export class Decoder {
         if (options.maxVertices !== undefined) view.setUint32(place + fields.max_vertices[0], options.maxVertices, true);
         if (options.maxTriangles !== undefined) view.setUint32(place + fields.max_triangles[0], options.maxTriangles, true);
         view.setBigUint64(place + fields.max_packet_bytes[0], BigInt(options.maxPacketBytes ?? 1 << 26), true);
-        view.setBigUint64(place + fields.max_memory[0], BigInt(options.maxMemory ?? 1 << 28), true);
+        view.setBigUint64(place + fields.max_memory[0], BigInt(options.maxMemory ?? 384 << 20), true);
         const handle = place + layout.size;
         const status = module.call('htvm_decoder_create', place, handle);
         this.#handle = module.view().getUint32(handle, true);
