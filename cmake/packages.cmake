@@ -6,7 +6,7 @@ if(NOT DPKG_DEB)
 endif()
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR "htvm developers")
-set(CPACK_PACKAGE_CONTACT "htvm developers")
+set(CPACK_PACKAGE_CONTACT "htvm developers <htvm@example.org>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "compression of human time-varying meshes")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
@@ -32,6 +32,9 @@ function(htvm_package component name section contents)
       "Compresses captured 3D people, one triangle mesh per frame, whose vertices\nand triangles change from frame to frame.\n.\nThis package has ${contents}."
       PARENT_SCOPE)
   set(CPACK_COMPONENTS_ALL ${CPACK_COMPONENTS_ALL} ${component} PARENT_SCOPE)
+  if(section STREQUAL "libs")
+    set(CPACK_DEBIAN_${upper}_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/triggers PARENT_SCOPE)
+  endif()
   install(FILES cmake/debian_copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} RENAME copyright
           COMPONENT ${component} EXCLUDE_FROM_ALL)
   install(FILES ${PROJECT_BINARY_DIR}/install/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name}
