@@ -10,6 +10,7 @@ packages=(libc6-dev libstdc++-12-dev libexpected-dev libeigen3-dev libnanoflann-
           python3-minimal libpython3-stdlib python3-numpy python3-pytest)
 [ ! -f "$root/made" ] || exit 0
 rm -rf "$root"
+mkdir -p "$(dirname "$root")"
 nice mmdebstrap --variant=extract --architectures=arm64 --include="$(IFS=,; echo "${packages[*]}")" \
     bookworm "$root" http://deb.debian.org/debian >&2 || { rm -rf "$root"; exit 1; }
 touch "$root/made" # all of it
