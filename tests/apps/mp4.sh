@@ -33,7 +33,7 @@ expect 0 "60 frames" "$htvm" join person.mp4 part.mp4 -o joined.mp4
 # ---- What is no such file -------------------------------------------------------------------------------------------
 
 head -c 600 direct.mp4 >cut.mp4
-expect 3 "cut.mp4: the .mp4's" "$htvm" info cut.mp4
+expect 3 "cut.mp4: the .mp4's box 'moov' is cut short; without it none of its frames is found" "$htvm" info cut.mp4
 # One that is cut short is decoded as far as it is whole, which is said.
 "$htvm" decode person.htvm -o of_htvm 2>/dev/null
 # The mesh of the whole stream, but for its picture, which may be cut off.
@@ -44,6 +44,11 @@ for kind in "" "--fragmented --fragment 0.4"; do
     head -c $(($(stat -c %s whole.mp4) * 2 / 3)) whole.mp4 >cut.mp4
     rm -rf of_mp4
     expect 3 "cut.mp4 is cut short: its end, " "$htvm" decode cut.mp4 -o of_mp4
+    expect 3 "the file is cut short: its end, " "$htvm" verify cut.mp4
+    expect 3 " of 45 frames are whole, up to frame " "$htvm" verify cut.mp4
+    expect 3 "'htvm join cut.mp4 -o whole.htvm' copies what is whole" "$htvm" verify cut.mp4
+    expect 0 "is missing, and is left out" "$htvm" join cut.mp4 -o kept.htvm
+    expect 0 "all sound" "$htvm" verify kept.htvm
     frames=$(ls of_mp4/*.ply 2>/dev/null | wc -l)
     [ "$frames" -ge 10 ] && [ "$frames" -lt 45 ] || fail "$frames frames come of an .mp4 ($kind) that is cut short"
     for mesh in of_mp4/*.ply; do same_mesh "$mesh" || fail "$mesh of an .mp4 ($kind) that is cut short"; done
