@@ -540,7 +540,9 @@ Result<void> decode(const Options& options) {
         if (auto ok = write_file(options.timestamps, frame_times_csv(summary.times)); !ok) return ok;
     if (options.json) print_json(summary, *input);
     if (input->refusal()) return tl::unexpected(*input->refusal());
-    if (!decoder.sequence() && input->oversized_packets() == 0) return not_a_stream(options);
+    if (!decoder.sequence() && input->oversized_packets() == 0)
+        return input->lost_segments() > 0 ? check_whole(*input, options.input, "nothing was decoded")
+                                          : not_a_stream(options);
     if (summary.written() == 0 && options.first > 0 && summary.undecodable + summary.missing == 0)
         return fail(ErrorKind::bad_input, fmt::format("{} has no frame {}", options.input, options.first));
     tell_what_was_written(options, *output, summary);

@@ -249,10 +249,16 @@ Result<void> run_verify(const Options& options) {
     if (const auto damaged = input->damaged_bytes() - input->cut_off_bytes(); damaged > 0)
         v.problems.insert(  // the cause of others
             v.problems.begin(), Problem{{}, counted(damaged, "byte") + " are not part of an undamaged packet"});
+    if (const auto lost = input->lost_segments(); lost > 0)
+        v.problems.insert(
+            v.problems.begin(),
+            Problem{{},
+                    input->first_loss() +
+                        (lost > 1 ? fmt::format("; {} in all are gone or cut short", counted(lost, "segment")) : "")});
     if (v.frames == 0) v.problems.push_back({{}, "there is no frame"});
     check_index(v, *input);
     const bool is_stream = v.decoder.sequence() || v.frames > 0 || v.refused || v.index;
-    if (!is_stream && !input->refusal() && input->oversized_packets() == 0)
+    if (!is_stream && !input->refusal() && input->oversized_packets() == 0 && input->lost_segments() == 0)
         v.problems = {{{}, "it is no htvm stream: no sequence header was found"}};
     const bool sound = v.problems.empty();
     if (options.json) {

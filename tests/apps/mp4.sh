@@ -88,6 +88,7 @@ head -c $(($(stat -c %s whole.m4s) / 2)) whole.m4s >"www/$segment"
 decode_lossy "names $segment, which is cut short" 31
 rm "www/$segment"
 decode_lossy "names $segment, which is not there; 30 frames were decoded" 30
+expect 3 "names $segment, which is not there" "$htvm" verify www/person.m3u8
 cp whole.m4s "www/$segment"
 first=$(grep '^000000' www/person.m3u8)
 mv "www/$first" first.m4s
@@ -97,6 +98,12 @@ mkdir many
 "$htvm" pack person.htvm -o many/person.m3u8 --segment 0.3 2>/dev/null
 rm many/000001-*.m4s many/000003-*.m4s
 expect 3 "1 segment more is left out, too" "$htvm" decode many/person.m3u8 -o of_many
+expect 3 "which is not there; 2 segments in all are gone or cut short" "$htvm" verify many/person.m3u8
+rm many/*.m4s
+for command in verify info "decode -o x"; do
+    # shellcheck disable=SC2086
+    expect 3 ", which is not there" "$htvm" $command many/person.m3u8
+done
 printf '#EXTM3U\n#EXT-X-MAP:URI="../../etc/passwd"\n#EXTINF:1,\na.m4s\n' >outside.m3u8
 expect 1 "which is not a file beside it" "$htvm" info outside.m3u8
 
