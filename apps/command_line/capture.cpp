@@ -26,15 +26,6 @@ namespace {
 std::size_t number_of(UpAxis up) { return (static_cast<std::size_t>(up) - 1) / 2; }
 bool is_downwards(UpAxis up) { return static_cast<std::size_t>(up) % 2 == 0; }
 
-// From the lowest to the highest vertex, in the mesh's unit; up: as in CaptureOptions.
-double height_of(const Mesh& mesh, UpAxis up) {
-    const auto bounds = surface_bounds(mesh);
-    const auto along = [&](std::size_t axis) {
-        return bounds ? static_cast<double>(bounds->high[axis]) - static_cast<double>(bounds->low[axis]) : 0.0;
-    };
-    return up == UpAxis::unknown ? std::max(along(1), along(2)) : along(number_of(up));
-}
-
 // The rate at which the median interval repeats.
 FrameRate rate_of(const std::vector<std::int64_t>& times) {
     std::vector<std::int64_t> intervals;

@@ -127,6 +127,18 @@ std::string in_words(const CLI::App& app, const CLI::Error& error) {
     return said == "A subcommand is required" ? "a command is required" : said;
 }
 
+// Of a command that lacks its -o, the word behind its input that is no file yet, as in "cp FROM TO"; or empty.
+std::string meant_output(const CLI::App& command) {
+    const auto& remaining = command.remaining();
+    std::vector<std::string> words(remaining.begin(), remaining.end());
+    for (const auto* option : command.get_options())
+        if (words.empty() && option->get_positional() && option->results().size() > 1)
+            words.push_back(option->results().back());
+    std::error_code error;
+    const bool one = words.size() == 1 && !words[0].starts_with('-') && !std::filesystem::exists(words[0], error);
+    return one ? words[0] : std::string();
+}
+
 // What was wrong with the command line, what may have been meant, and where to read on.
 std::string usage_message(const CLI::App* app, const CLI::Error& error) {
     std::string command = app->get_name(), help = "--help";
@@ -135,10 +147,14 @@ std::string usage_message(const CLI::App* app, const CLI::Error& error) {
         command += " " + named->get_name();
         chosen = named;
         // The front page may lack the very option that was wrong.
-        if (named->get_option_no_throw("--help-all")) help = "--help-all";
+        if (const auto* all = named->get_option_no_throw("--help-all"); all && !all->get_group().empty())
+            help = "--help-all";
     }
     const auto unknown = unknown_flag(*chosen), said = in_words(*app, error);
-    const auto hint = unknown.starts_with("--") ? hint_at(*app, *chosen, unknown) : std::string();
+    auto hint = unknown.starts_with("--") ? hint_at(*app, *chosen, unknown) : std::string();
+    const auto* output = chosen->get_option_no_throw("--output");
+    if (const auto meant = meant_output(*chosen); output && output->count() == 0 && !meant.empty())
+        hint = fmt::format("did you mean -o {}? ", meant);
     return fmt::format("{}: error: {}{} {}'{} {}' tells more\n", app->get_name(), said, said.ends_with('?') ? "" : ";",
                        hint, command, help);
 }
@@ -194,10 +210,14 @@ void say_no_such_command(const Program& program, const CLI::App& app, const std:
     const auto meant = meant_word(word, command_names(app));
     const auto flags = flags_of(app);
     const bool is_flag = std::find(flags.begin(), flags.end(), "--" + word) != flags.end();
+    std::error_code error;
+    const bool is_there = std::filesystem::exists(word, error);
     const std::string hint = found != program.elsewhere.end() ? fmt::format("it is '{}'", found->second)
-                             : is_flag                        ? fmt::format("did you mean --{}?", word)
-                             : meant.empty()                  ? fmt::format("'{} --help' lists them", program.name)
-                                                              : fmt::format("did you mean '{}'?", meant);
+                             : is_there && !program.for_files.empty()
+                                 ? fmt::format("what to do with a file comes first: {}", program.for_files)
+                             : is_flag       ? fmt::format("did you mean --{}?", word)
+                             : meant.empty() ? fmt::format("'{} --help' lists them", program.name)
+                                             : fmt::format("did you mean '{}'?", meant);
     fmt::print(stderr, "{}: error: there is no command '{}'; {}\n", program.name, word, hint);
 }
 
@@ -243,6 +263,16 @@ int exit_with(const Program& program, const Error& error) {
 
 }  // namespace
 
+namespace {
+
+// A command whose --help shows all it has takes --help-all, too: who knows it of one command tries it with others.
+void accept_help_all(CLI::App& command) {
+    if (command.get_option_no_throw("--help-all")) return;
+    command.add_flag_callback("--help-all", [] { throw CLI::CallForHelp(); })->group("");
+}
+
+}  // namespace
+
 void add_front_page(CLI::App& command, FrontPage page) {
     command.set_help_flag();
     command.add_flag_callback(
@@ -265,11 +295,13 @@ int run_program(const Program& program, int argc, char** argv) {
     app.failure_message(usage_message);
     app.formatter(help_formatter());
     app.require_subcommand(1);
+    accept_help_all(app);
     Run run;
     for (const auto add : program.commands) add(app, run);
     const auto words = asked_words(argc, argv);
     for (auto* command : app.get_subcommands([](const CLI::App*) { return true; })) {
         command->add_flag_callback("--quiet", quieten, "Say nothing but warnings and errors");
+        accept_help_all(*command);
         command->preparse_callback([command, &words](std::size_t) { refuse_values_of_switches(*command, words); });
     }
     app.add_subcommand("help", fmt::format("Explain a command: {} help COMMAND", program.name));

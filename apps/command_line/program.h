@@ -26,7 +26,8 @@ struct Program {
     std::string description;  // one sentence, at the top of --help
     std::string footer;       // at the end of --help, after the exit codes; may be empty
     std::vector<AddCommand> commands;
-    std::map<std::string, std::string> elsewhere;  // commands of another program, and what to type for them
+    std::map<std::string, std::string> elsewhere = {};  // commands of another program, and what to type for them
+    std::string for_files = "";  // what people who type a file's name in place of a command may have meant
 };
 
 struct ExitCode {

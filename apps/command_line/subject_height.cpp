@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 namespace htvm::app {
 namespace {
 
@@ -25,6 +27,14 @@ std::string length_text(double millimetres) {
     if (millimetres < 10) return fmt::format("{:.2g} mm", millimetres);
     if (millimetres < 1000) return fmt::format("{:.0f} cm", millimetres / 10);
     return fmt::format("{:.2f} m", millimetres / 1000);
+}
+
+double height_of(const Mesh& mesh, UpAxis up) {
+    const auto bounds = surface_bounds(mesh);
+    const auto along = [&](std::size_t axis) {
+        return bounds ? static_cast<double>(bounds->high[axis]) - static_cast<double>(bounds->low[axis]) : 0.0;
+    };
+    return up == UpAxis::unknown ? std::max(along(1), along(2)) : along((static_cast<std::size_t>(up) - 1) / 2);
 }
 
 MeshRemark remark_on_height(double tall, LengthUnit unit, const std::string& format) {

@@ -3,10 +3,16 @@
 
 #include <string>
 
+#include "htvm/mesh.hpp"
+#include "htvm/scene.hpp"
 #include "io/mesh_file.h"
 #include "io/mesh_reading.h"
 
 namespace htvm::app {
+
+// From the lowest to the highest vertex that triangles name, in the mesh's unit; where up is not known, along y or z,
+// whichever is longer.
+double height_of(const Mesh& mesh, UpAxis up);
 
 // "1.75 m", "69 cm", "0.2 mm".
 std::string length_text(double millimetres);

@@ -21,6 +21,7 @@
 #include "htvm/encoder.hpp"
 #include "metrics/mesh_facts.h"
 #include "metrics/percentile.h"
+#include "surface/open_border.h"
 #include "surface/triangle_cleaning.h"
 
 namespace htvm::app {
@@ -37,6 +38,7 @@ struct CheckedFrame {
     std::int64_t timestamp_us = 0;
     std::size_t missing_before = 0;  // frames, by the numbers in the names
     MeshFacts facts;
+    double height = 0;                    // mm
     std::size_t doubled = 0, turned = 0;  // triangles (surface/triangle_cleaning.h)
     bool colours = false, normals = false, texcoords = false;
     int texture_width = 0, texture_height = 0;  // of its image; 0: none
@@ -59,13 +61,14 @@ struct Report {
     double fps = 30;
     double millimetres_per_unit = 1;
     GlobalShift shift{};
+    internal::Openness openness = internal::Openness::closed;  // of the first frame, as encode sees the capture
     std::string lacks_images;  // why no frame can be encoded, where it is the images alone; empty: some can
 };
 
 // ---- Looking at frames ----------------------------------------------------------------------------------------------
 
 // origin: of the lattice on which the first frame put all; nothing: it has no position.
-CheckedFrame look_at(const Capture& capture, const Mesh& mesh,
+CheckedFrame look_at(const Capture& capture, const Mesh& mesh, UpAxis up,
                      const std::optional<std::array<std::int32_t, 3>>& origin) {
     CheckedFrame out;
     out.name = capture.name();
@@ -73,6 +76,7 @@ CheckedFrame look_at(const Capture& capture, const Mesh& mesh,
     const auto textured = capture.textured();
     const Mesh& captured = textured ? textured->mesh : mesh;
     out.facts = facts_of(mesh);
+    out.height = height_of(mesh, up);
     out.size = size_of(mesh);
     out.farthest = farthest_from(out.size.middle, mesh);
     out.colours = !captured.colours.empty();
@@ -179,8 +183,11 @@ Result<Report> look_at_all(const Options& options) {
             continue;
         }
         if (!origin)
-            if (const auto found = internal::lattice_origin(**mesh)) origin = *found;
-        auto frame = look_at(*capture, **mesh, origin);
+            if (const auto found = internal::lattice_origin(**mesh)) {
+                origin = *found;
+                report.openness = internal::openness_of((*mesh)->positions, (*mesh)->triangles);
+            }
+        auto frame = look_at(*capture, **mesh, options.capture.up, origin);
         frame.missing_before = capture->missing_before();
         frame.repeats = !before.empty() && before == (*mesh)->positions;
         if (const auto why = trial.add(**mesh, frame.timestamp_us); !why.empty()) frame.wrong = frame.name + ": " + why;
@@ -343,8 +350,7 @@ Judgement judge(const Report& report) {
     const auto spread = [&](auto value) { return spread_of(values_of(report, value)); };
     j.vertices = spread([](const auto& f) { return f.facts.vertices; });
     j.triangles = spread([](const auto& f) { return f.facts.triangles; });
-    j.height = spread(
-        [](const auto& f) { return std::max(f.facts.high[1] - f.facts.low[1], f.facts.high[2] - f.facts.low[2]); });
+    j.height = spread([](const auto& f) { return f.height; });
     j.edge = spread([](const auto& f) { return f.facts.mean_edge; });
     j.border = spread([](const auto& f) { return f.facts.border; });
     j.pieces = spread([](const auto& f) { return f.facts.pieces; });
@@ -403,6 +409,14 @@ void print_frames(const char* what, const Report& report, std::size_t count, Tex
     }
 }
 
+const char* surface_text(internal::Openness openness) {
+    using enum internal::Openness;
+    if (openness == bordered) return "open: it has borders; encode says with each frame what is there (--presence)";
+    if (openness == in_pieces)
+        return "in pieces, as where depth cameras see a person; encode says with each frame what is there (--presence)";
+    return "closed, or nearly so";
+}
+
 void print_report(const Report& report, const Judgement& j, const std::string& input) {
     const auto& last = report.frames.back();
     fmt::print("{}: {} at {:g} frames/s, {:.2f} s\n", input, counted(report.frames.size(), "frame"), report.fps,
@@ -415,6 +429,7 @@ void print_report(const Report& report, const Judgement& j, const std::string& i
                    static_cast<double>(report.shift[0]) / 1000, static_cast<double>(report.shift[1]) / 1000,
                    static_cast<double>(report.shift[2]) / 1000);
     fmt::print("  attributes   {}\n", attributes_of(report, j));
+    fmt::print("  surface      {}\n", surface_text(report.openness));
     fmt::print("  pieces       {}, of them specks {}, far away {}\n", text_of(j.pieces), text_of(j.specks),
                text_of(j.strays));
     fmt::print("  border       {:.2f} m, vertices in no triangle {}\n", j.border.middle / 1000, text_of(j.unused));
@@ -481,6 +496,9 @@ void print_json(const Report& report, const Judgement& j) {
                               {"triangles", json_of(j.triangles)},
                               {"height_mm", json_of(j.height)},
                               {"border_mm", json_of(j.border)},
+                              {"surface", report.openness == internal::Openness::closed     ? "closed"
+                                          : report.openness == internal::Openness::bordered ? "bordered"
+                                                                                            : "in_pieces"},
                               {"doubled_share", j.doubled},
                               {"turned_share", j.turned},
                               {"area_flicker", j.area_flicker},
@@ -515,7 +533,10 @@ Result<void> check(const Options& options) {
 constexpr const char* words_of_the_report =
     "The words of the report:\n"
     "  a range in brackets   the least and the most that a frame has, beside the middle one of all frames\n"
-    "  size                  of the largest piece; edges: the mean of their lengths\n"
+    "  size                  from the lowest to the highest vertex, along --up, or else y or z, whichever is longer;\n"
+    "                        edges: the mean of their lengths\n"
+    "  surface               of the first frame: closed, with borders, or in five large pieces or more, each of which\n"
+    "                        may be closed by itself\n"
     "  pieces, specks        triangles that hang together; those of less than a hundredth of the largest one's area\n"
     "  far away              pieces that float farther from the largest one than a tenth of its size\n"
     "  border                how long the edges are in all that only one triangle has: the rims of holes and of open\n"

@@ -36,6 +36,7 @@
 #include "stream_file.h"
 #include "stream_seek.h"
 #include "texture_output.h"
+#include "used_folder.h"
 
 namespace htvm::app {
 namespace {
@@ -94,7 +95,7 @@ public:
         out.names_ = std::move(*names);
         std::error_code error;
         if (!out.names_.folder.empty()) std::filesystem::create_directories(out.names_.folder, error);
-        out.folder_alone_ = !out.names_.one_file && options.output.find('%') == std::string::npos;
+        out.is_pattern_ = options.output.find('%') != std::string::npos;
         if (error)
             return fail(ErrorKind::bad_input, out.names_.folder.string() + " cannot be made: " + error.message());
         return out;
@@ -131,15 +132,10 @@ public:
     Result<void> finish() { return animation_ ? animation_->finish(end_) : Result<void>(); }
     // Whether the first frame is all that is asked for.
     bool one_file() const { return !standard_ && !animated_ && names_.one_file; }
-    // Meshes in the folder that this run did not write: they would be read as part of the same sequence.
-    std::size_t other_meshes() const {
-        if (!folder_alone_) return 0;  // with a pattern, its files are distinct from others
-        std::size_t others = 0;
-        std::error_code error;
-        const auto folder = names_.folder.empty() ? std::filesystem::path(".") : names_.folder;
-        for (const auto& entry : std::filesystem::directory_iterator(folder, error))
-            if (is_mesh_file_name(entry.path()) && !written_.contains(entry.path().filename().string())) ++others;
-        return others;
+    // Frames of an earlier run would be read as part of the same sequence.
+    void warn_of_other_frames() const {
+        if (standard_ || names_.one_file) return;
+        app::warn_of_other_frames(names_, is_pattern_, written_);
     }
 
 private:
@@ -149,6 +145,7 @@ private:
             image_path_ = mesh;
             image_path_.replace_extension(image.extension);
             if (auto ok = write_file(image_path_, *image.bytes); !ok) return ok;
+            written_.insert(image_path_.filename().string());
             written_image_ = image.bytes;
         }
         options.texture = image_path_.filename().string();
@@ -188,7 +185,7 @@ private:
     std::optional<GltfAnimation> animation_;  // from the first frame on, if all go into one .glb
     std::optional<std::uint32_t> sequence_;   // of the last frame in it
     double offset_ = 0, end_ = 0;             // seconds: of its sequence's timestamps; when it ends
-    bool standard_ = false, folder_alone_ = false, animated_ = false;
+    bool standard_ = false, is_pattern_ = false, animated_ = false;
     bool in_metres_ = false;  // whatever the capture was in
 };
 
@@ -377,6 +374,8 @@ Result<bool> decode_next(Decoding& d) {
     }
     if (!packet) {
         const auto promised = static_cast<std::uint32_t>(std::min<std::uint64_t>(d.promised, 0xFFFFFFFF));
+        // Of a stream that ends before its first frame, all that its index tells of is missing.
+        if (d.next_number == 0) d.summary.missing = promised;
         if (auto ok = fill_gap(d, promised, d.summary.timestamp_us.value_or(0), false); !ok)
             return tl::unexpected(ok.error());
         return false;
@@ -438,12 +437,7 @@ void tell_what_was_written(const Options& options, const MeshOutput& output, con
     note(fmt::format("{} to {}, decoded at {:.1f} frames/s", frames,
                      options.output == "-" ? "standard output" : options.output, summary.frames_per_second()));
     if (options.images && !summary.any_picture) note("there are no pictures of a texture, so --images does nothing");
-    const auto others = output.other_meshes();
-    if (others > 0 && summary.written() > 0)
-        warn(fmt::format(
-            "the output folder also contains {}, perhaps from an earlier run, which will be read along with "
-            "these",
-            counted(others, "other mesh file")));
+    if (summary.written() > 0) output.warn_of_other_frames();
 }
 
 // An error if the stream is incomplete.
@@ -455,10 +449,11 @@ Result<void> judge(const Options& options, const MeshOutput& output, const Strea
                                                        options.input, summary.undecodable, summary.refused->message));
     const bool all = (options.frames == 0 || summary.written() < options.frames) && !output.one_file();
     if (all || input.oversized_packets() > 0 || input.damaged_bytes() > 0)
-        if (auto whole = check_whole(
-                input, options.input,
-                fmt::format("{} decoded, {} others are lost",
-                            counted(summary.decoded, "frame") + (summary.decoded == 1 ? " was" : " were"), lost));
+        if (auto whole =
+                check_whole(input, options.input,
+                            fmt::format("{} decoded, {} {} lost",
+                                        counted(summary.decoded, "frame") + (summary.decoded == 1 ? " was" : " were"),
+                                        counted(lost, "other"), lost == 1 ? "is" : "are"));
             !whole)
             return whole;
     if (lost == 0 && summary.damaged_packets == 0 && lost_pictures > 0)
@@ -545,7 +540,9 @@ Result<void> decode(const Options& options) {
         if (auto ok = write_file(options.timestamps, frame_times_csv(summary.times)); !ok) return ok;
     if (options.json) print_json(summary, *input);
     if (input->refusal()) return tl::unexpected(*input->refusal());
-    if (!decoder.sequence() && input->oversized_packets() == 0) return not_a_stream(options);
+    if (!decoder.sequence() && input->oversized_packets() == 0)
+        return input->lost_segments() > 0 ? check_whole(*input, options.input, "nothing was decoded")
+                                          : not_a_stream(options);
     if (summary.written() == 0 && options.first > 0 && summary.undecodable + summary.missing == 0)
         return fail(ErrorKind::bad_input, fmt::format("{} has no frame {}", options.input, options.first));
     tell_what_was_written(options, *output, summary);

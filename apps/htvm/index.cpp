@@ -23,7 +23,7 @@ Result<void> run_index(const Options& options) {
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
     const auto path = options.output.empty() ? options.input : options.output;
-    auto output = StreamOutput::open(path);
+    auto output = options.output.empty() ? StreamOutput::replace(path) : StreamOutput::open(path);
     if (!output) return tl::unexpected(output.error());
     auto settings = options.limits;
     settings.intra_coder = draco_intra_coder();

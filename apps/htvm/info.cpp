@@ -556,7 +556,8 @@ Result<void> info(const Options& options) {
         if (input->is_live()) std::fflush(stdout);
     }
     if (input->refusal()) return tl::unexpected(*input->refusal());
-    if (!in.headers.sequence() && input->oversized_packets() > 0) return check_whole(*input, options.input);
+    if (!in.headers.sequence() && input->oversized_packets() + input->lost_segments() > 0)
+        return check_whole(*input, options.input);
     if (!in.headers.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
     if (options.json)

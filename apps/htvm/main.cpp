@@ -10,5 +10,7 @@ int main(int argc, char** argv) {
                         add_cut,   add_join,  add_pack,   add_index,   add_verify, add_still,     add_render,
                         add_play,  add_demo,  add_serve,  add_publish, add_link};
     program.elsewhere = {{"rd", "htvm-lab rd"}, {"reproduce", "htvm-lab reproduce"}};
+    program.for_files =
+        "'htvm play FILE' shows it, 'htvm info FILE' tells what is in it, 'htvm encode FOLDER' compresses";
     return run_program(program, argc, argv);
 }

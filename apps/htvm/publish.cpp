@@ -243,6 +243,7 @@ std::string contradiction_in(const Options& options) {
         return "--ladder: the last word is where to: ws://HOST:PORT/publish/NAME, or wss://";
     if (destination_of(options.inputs.front()).is_hub())
         return "input: is a file or standard input; hubs come behind it";
+    if (options.hubs.empty()) return "hubs: say where to, behind the file: ws://HOST:PORT/publish/NAME, or wss://";
     return {};
 }
 
@@ -259,8 +260,7 @@ void add_publish(CLI::App& app, Run& run) {
                      "Where to: ws://HOST:PORT/publish/NAME, or wss:// with TLS. Of several, where to go on if one is\n"
                      "lost; they may leave the path away")
         ->type_name("URL")
-        ->expected(1, -1)
-        ->required();
+        ->expected(1, -1);
     command->add_flag(
         "--ladder", options->ladder,
         "The stream in several qualities, each a file of its own, the coarsest first, or what htvm encode\n"

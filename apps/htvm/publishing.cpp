@@ -137,16 +137,26 @@ Result<Publishing> Publishing::open(const std::string& address, const Publishing
     return Publishing(std::move(*publisher), options.ends);
 }
 
+// A hub takes the connection before it judges the stream: it is found again once it has kept the connection for a
+// while, which is longer than it takes to refuse what it was sent.
 void Publishing::tell() {
+    constexpr std::chrono::seconds kept{1};
     const auto now = publisher_.state();
-    if (!now.trouble.empty() && now.trouble != told_) warn(now.trouble + "; trying again");
-    if (now.connected && !told_.empty()) note("connected to " + now.hub);
-    if (now.connected || !now.trouble.empty()) told_ = now.trouble;
+    if (now.is_over) return;  // said by who ends for it
+    if (!now.trouble.empty() && now.trouble != told_) {
+        warn(now.trouble + "; trying again");
+        told_ = now.trouble;
+    }
+    if (!now.connected || std::exchange(connections_, now.connections) != now.connections) connected_ = Clock::now();
+    if (!now.connected || told_.empty() || Clock::now() - connected_ < kept) return;
+    note("connected to " + now.hub);
+    told_.clear();
 }
 
 Result<void> Publishing::send(const Packet& packet) {
-    tell();
-    return publisher_.send(packet);
+    auto sent = publisher_.send(packet);
+    if (sent) tell();
+    return sent;
 }
 
 LineState Publishing::line() const {

@@ -86,8 +86,10 @@ private:
 
     Publisher publisher_;
     bool ends_;
-    std::string told_;                                // trouble
-    std::chrono::steady_clock::time_point looked_{};  // when the rate was last measured
+    std::string told_;                                   // trouble, until a connection has stood
+    std::uint64_t connections_ = 0;                      // when last looked at
+    std::chrono::steady_clock::time_point connected_{};  // when the present connection was first seen
+    std::chrono::steady_clock::time_point looked_{};     // when the rate was last measured
     std::uint64_t bytes_then_ = 0;
     double megabits_ = 0;
 };

@@ -54,6 +54,17 @@ Result<std::size_t> position_of(const Options& options, const MeshSource& source
     return static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - times.begin(), 1) - 1);
 }
 
+// Whether the time asked for is more than a tenth of a second behind the last frame.
+bool is_beyond(const Options& options, const MeshSource& source) {
+    constexpr double shown = 0.1;  // a frame is, until the next would come
+    if (!options.seconds) return false;
+    const double last =
+        source.times_us.empty()
+            ? static_cast<double>(source.frames - 1) / (source.rate.numerator > 0 ? source.rate.per_second() : 30)
+            : static_cast<double>(source.times_us.back() - source.times_us.front()) / 1e6;
+    return *options.seconds > last + shown;
+}
+
 Result<void> still(const Options& options) {
     if (options.output != "-" && !options.output.ends_with(".png"))
         return fail(ErrorKind::unsupported, "pictures are written as .png, not as " + options.output);
@@ -92,7 +103,8 @@ Result<void> still(const Options& options) {
                                           {"triangles", mesh->triangles.size()}}
                                .dump(2));
     else if (options.output != "-")
-        note(fmt::format("{}: frame {} of {}, {} x {} pixels", options.output, number, source->name, picture.width,
+        note(fmt::format("{}: frame {} of {}{}, {} x {} pixels", options.output, number, source->name,
+                         is_beyond(options, *source) ? ", its last, as it ends before that time" : "", picture.width,
                          picture.height));
     return {};
 }

@@ -134,6 +134,8 @@ bool StreamInput::is_live() const { return watcher_ || (segments_ && segments_->
 
 std::uint64_t StreamInput::missing_bytes() const { return mp4_ ? mp4_->missing_bytes() : 0; }
 
+std::uint64_t StreamInput::cut_off_bytes() const { return mp4_ ? mp4_->cut_off_bytes() : 0; }
+
 std::uint64_t StreamInput::lost_segments() const { return segments_ ? segments_->lost_segments() : 0; }
 
 std::string StreamInput::first_loss() const { return segments_ ? segments_->first_loss() : std::string(); }
@@ -239,16 +241,19 @@ Result<void> check_whole(const StreamInput& input, const std::string& path, cons
     return {};
 }
 
+bool is_whole_but_for_end(const StreamInput& input) {
+    if (input.refusal() || input.oversized_packets() > 0 || input.lost_segments() > 0) return false;
+    const auto damage = input.damaged_bytes() + input.cut_short_bytes();
+    if (input.missing_bytes() > 0) return damage == input.cut_off_bytes();
+    return damage > 0 && damage == input.torn_bytes();
+}
+
 Result<void> check_whole_but_for_end(const StreamInput& input, const std::string& path) {
-    if (input.missing_bytes() > 0 && input.damaged_bytes() + input.cut_short_bytes() == 0) {
-        warn(fmt::format("{} is cut short: its end, {}, is missing, and is left out", path,
-                         counted(input.missing_bytes(), "byte")));
-        return {};
-    }
-    const auto torn = input.torn_bytes();
-    if (torn == 0 || torn != input.damaged_bytes() + input.cut_short_bytes() || input.oversized_packets() > 0)
-        return check_whole(input, path);
-    warn(fmt::format("{} ends in {} that are no whole packet, which are left out", path, counted(torn, "byte")));
+    if (!is_whole_but_for_end(input)) return check_whole(input, path);
+    warn(input.missing_bytes() > 0 ? fmt::format("{} is cut short: its end, {}, is missing, and is left out", path,
+                                                 counted(input.missing_bytes(), "byte"))
+                                   : fmt::format("{} ends in {} that are no whole packet, which are left out", path,
+                                                 counted(input.torn_bytes(), "byte")));
     return {};
 }
 
@@ -267,6 +272,26 @@ std::string other_kind_of(const std::filesystem::path& path) {
     if (is_of({".wav", ".flac", ".opus", ".ogg", ".mp3", ".m4a", ".aac"})) return "a sound";
     if (is_of({".bvh", ".json", ".csv", ".txt", ".html"})) return "a text";
     if (is_of({".zip", ".gz", ".tar", ".7z", ".usd", ".usdz", ".fbx", ".abc"})) return "another format";
+    return {};
+}
+
+// Whether a stream may be written to a file of that name.
+Result<void> check_name(const std::string& path) {
+    std::error_code none;
+    if (std::filesystem::is_directory(path, none))
+        return fail(ErrorKind::bad_input, path +
+                                              " cannot be written: it is a folder; give the stream a name, such as " +
+                                              (std::filesystem::path(path) / "person.htvm").string());
+    if (const auto what = other_kind_of(path); !what.empty())
+        return fail(ErrorKind::bad_input, path + " is the name of " + what +
+                                              ", but a stream would be written there; give one that ends in .htvm");
+    const auto ending = internal::lower_case(std::filesystem::path(path).extension().string());
+    const bool is_device = std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none);
+    if (!is_stream_name(path) && !ending.empty() && !is_device)
+        return fail(ErrorKind::bad_input,
+                    fmt::format("{}: {} is no ending of a stream; give .htvm, .mp4, or .m3u8 for segments and their "
+                                "playlist",
+                                path, ending));
     return {};
 }
 
@@ -297,14 +322,15 @@ Result<StreamOutput> StreamOutput::open(const std::string& path, const Publishin
         output.publishing_.emplace(std::move(*opened));
         return output;
     }
-    if (const auto what = other_kind_of(path); !what.empty())
-        return fail(ErrorKind::bad_input, path + " is the name of " + what +
-                                              ", but a stream would be written there; give one that ends in .htvm");
+    if (auto fine = check_name(path); !fine) return tl::unexpected(fine.error());
+    return open_file(path);
+}
+
+Result<StreamOutput> StreamOutput::replace(const std::string& path) { return open_file(path); }
+
+Result<StreamOutput> StreamOutput::open_file(const std::string& path) {
+    StreamOutput output;
     const auto ending = internal::lower_case(std::filesystem::path(path).extension().string());
-    std::error_code none;
-    const bool is_device = std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none);
-    if (!is_stream_name(path) && !ending.empty() && !is_device)
-        note(fmt::format("{} becomes an .htvm stream, as {} is no ending that is known", path, ending));
     // Another file is made of these at the end.
     std::string packets = path;
     constexpr const char* packets_beside = ".htvm";

@@ -54,6 +54,8 @@ public:
     std::uint64_t oversized_packets() const { return reader_.oversized_packets(); }
     // Bytes that a file which is cut short tells of and has not.
     std::uint64_t missing_bytes() const;
+    // Among the damaged ones, those of pictures and sound whose other part lies there.
+    std::uint64_t cut_off_bytes() const;
     // A playlist's segments that are gone or cut short, and what is wrong with the first of them, as a sentence
     // without its end.
     std::uint64_t lost_segments() const;
@@ -87,6 +89,9 @@ private:
 Result<void> check_whole(const StreamInput& input, const std::string& path,
                          const std::string& advice = "'htvm verify' tells more");
 
+// Whether all is whole but for the end, which is torn or missing: the next function lets such a stream pass.
+bool is_whole_but_for_end(const StreamInput& input);
+
 // For commands that write the stream anew: likewise, but an end that is torn is left out, which a warning says.
 Result<void> check_whole_but_for_end(const StreamInput& input, const std::string& path);
 
@@ -95,8 +100,11 @@ Result<void> check_whole_but_for_end(const StreamInput& input, const std::string
 // playlist, are made of these packets at the end. To a hub, packets go at once.
 class StreamOutput {
 public:
-    // "-" is standard output, ws:// and wss:// a hub.
+    // "-" is standard output, ws:// and wss:// a hub. Fails (bad_input) for a file whose ending is known to be another
+    // kind's, or is none that streams have: .htvm, .mp4, .m3u8 or no ending at all.
     static Result<StreamOutput> open(const std::string& path, const PublishingOptions& publishing = {});
+    // In the place of a stream that is there, whatever it is called.
+    static Result<StreamOutput> replace(const std::string& path);
     // To a hub: frames wait until they are due by their timestamps, as those of files have to.
     void pace() { pacing_.emplace(); }
     // How long they have waited for that, milliseconds.
@@ -129,6 +137,7 @@ public:
     std::uint64_t bytes() const { return bytes_; }
 
 private:
+    static Result<StreamOutput> open_file(const std::string& path);
     bool is_indexed() const { return file_ && file_->is_file(); }
     Result<void> write_all(const std::vector<Packet>& packets);
     Result<void> write_one(const Packet& packet);

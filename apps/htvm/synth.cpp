@@ -34,6 +34,7 @@
 #include "synth/texture.h"
 #include "synth_truth.h"
 #include "texture_output.h"
+#include "used_folder.h"
 
 namespace htvm::app {
 
@@ -126,6 +127,7 @@ Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, Skele
             const Mesh& shown = captures[i] ? captures[i]->mesh : textures[i] ? textures[i]->mesh : frame.mesh;
             if (auto ok = write_frame(options, path, shown, textures[i]); !ok) return tl::unexpected(ok.error());
             written.names.insert(path.filename().string());
+            if (textures[i]) written.names.insert(path.stem().string() + extension_of(options.texture_format));
             written.vertices += shown.positions.size();
             written.triangles += shown.triangles.size();
             add_pose(noisy, std::move(frame.pose));
@@ -139,19 +141,6 @@ Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, Skele
         }
     }
     return written;
-}
-
-// Frames of an earlier run in the same folder would be read as part of the same sequence.
-void warn_of_other_meshes(const Options& options, const std::set<std::string>& written) {
-    std::size_t others = 0;
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(options.folder, error))
-        if (is_mesh_file_name(entry.path()) && !written.contains(entry.path().filename().string())) ++others;
-    if (others > 0)
-        warn(
-            fmt::format("{} holds {}, which will be read along with these frames; remove them if that "
-                        "is not wanted",
-                        options.folder, counted(others, "other mesh file")));
 }
 
 void report(const Options& options, const Written& written) {
@@ -206,7 +195,7 @@ Result<void> synthesise(const Options& options) {
     if (auto ok = write_skeleton((folder / "skeleton.json").string(), noisy); !ok) return ok;
     if (auto ok = write_skeleton((folder / "skeleton_true.json").string(), exact); !ok) return ok;
     written->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    warn_of_other_meshes(options, written->names);
+    warn_of_other_frames({.folder = options.folder, .prefix = "", .suffix = ""}, false, written->names);
     report(options, *written);
     return {};
 }

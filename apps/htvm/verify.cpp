@@ -184,18 +184,51 @@ void take(Verification& v, const Packet& packet) {
     check_decoding(v, packet, number);
 }
 
-// An index that covers the whole file must be what its packets give.
-void check_index(Verification& v) {
-    if (!v.index || v.index->bytes < v.offset) return;
+// Where a stream ends that has fewer frames than its index says, or whose end is torn.
+void report_end(Verification& v, const StreamInput& input) {
+    if (input.missing_bytes() > 0)
+        v.problems.push_back(
+            {{},
+             fmt::format("the file is cut short: its end, {}, is missing", counted(input.missing_bytes(), "byte"))});
+    if (input.cut_short_bytes() > 0)
+        v.problems.push_back({{},
+                              fmt::format("the stream ends in the middle of a packet, {} behind the last whole one",
+                                          counted(input.cut_short_bytes(), "byte"))});
+    if (v.frames == 0) return;
+    const auto promised = v.index ? v.index->frames : 0;
+    v.problems.push_back(
+        {{},
+         fmt::format(
+             "{} {} whole, up to frame {} at {:.2f} s",
+             promised > v.frames ? fmt::format("{} of {} frames", v.frames, promised) : counted(v.frames, "frame"),
+             v.frames == 1 ? "is" : "are", *v.last_number, static_cast<double>(v.last_us) / 1e6)});
+}
+
+// An index that covers the whole file must be what its packets give. Where the end is missing, that is what is said.
+void check_index(Verification& v, const StreamInput& input) {
+    if (is_whole_but_for_end(input)) return report_end(v, input);
+    if (input.cut_short_bytes() > 0) v.problems.push_back({{}, "the stream ends in the middle of a packet"});
+    if (input.damaged_bytes() > 0 || !v.index || v.index->bytes < v.offset) return;
     auto found = v.indexer.finish(v.offset);
     found.bounds = v.index->bounds;
     found.duration_us = v.index->duration_us;  // informative: how long the last frame lasts is the writer's choice
     if (*v.index == found) return;
+    const bool ends_early = v.problems.empty() && v.index->frames > found.frames && v.last_number == v.frames - 1;
     if (v.index->frames != found.frames)
         v.problems.push_back(
             {{}, fmt::format("the index says {} frames, there are {}", v.index->frames, found.frames)});
     else
         v.problems.push_back({{}, "the index does not fit the packets; 'htvm index' writes another"});
+    if (ends_early) report_end(v, input);
+}
+
+// What to do with a stream that is not sound.
+std::string advice_on(const Verification& v, const StreamInput& input, const std::string& path) {
+    const bool is_undamaged = input.damaged_bytes() + input.cut_short_bytes() == 0;
+    const bool lacks_frames = is_undamaged && v.index && v.index->frames > v.frames && v.last_number == v.frames - 1;
+    if (v.frames > 0 && (is_whole_but_for_end(input) || lacks_frames))
+        return fmt::format("; 'htvm join {} -o whole.htvm' copies what is whole", path);
+    return ": " + counted(v.problems.size(), "problem");
 }
 
 Result<void> run_verify(const Options& options) {
@@ -213,13 +246,20 @@ Result<void> run_verify(const Options& options) {
         }
     }
     if (v.last_number) report_bare_frames(v, *v.last_number + 1);
-    if (input->damaged_bytes() > 0)
+    if (const auto damaged = input->damaged_bytes() - input->cut_off_bytes(); damaged > 0)
         v.problems.insert(  // the cause of others
+            v.problems.begin(), Problem{{}, counted(damaged, "byte") + " are not part of an undamaged packet"});
+    if (const auto lost = input->lost_segments(); lost > 0)
+        v.problems.insert(
             v.problems.begin(),
-            Problem{{}, counted(input->damaged_bytes(), "byte") + " are not part of an undamaged packet"});
-    if (input->cut_short_bytes() > 0) v.problems.push_back({{}, "the stream ends in the middle of a packet"});
+            Problem{{},
+                    input->first_loss() +
+                        (lost > 1 ? fmt::format("; {} in all are gone or cut short", counted(lost, "segment")) : "")});
     if (v.frames == 0) v.problems.push_back({{}, "there is no frame"});
-    if (input->damaged_bytes() == 0) check_index(v);
+    check_index(v, *input);
+    const bool is_stream = v.decoder.sequence() || v.frames > 0 || v.refused || v.index;
+    if (!is_stream && !input->refusal() && input->oversized_packets() == 0 && input->lost_segments() == 0)
+        v.problems = {{{}, "it is no htvm stream: no sequence header was found"}};
     const bool sound = v.problems.empty();
     if (options.json) {
         nlohmann::json problems = nlohmann::json::array();
@@ -234,6 +274,8 @@ Result<void> run_verify(const Options& options) {
                                           {"audio_packets", v.audio_packets},
                                           {"pictures", v.pictures},
                                           {"damaged_bytes", input->damaged_bytes()},
+                                          {"missing_bytes", input->missing_bytes()},
+                                          {"cut_short_bytes", input->cut_short_bytes()},
                                           {"problems", problems}}
                                .dump(2));
     } else {
@@ -254,7 +296,7 @@ Result<void> run_verify(const Options& options) {
     }
     if (sound) return {};
     return fail(v.refused.value_or(ErrorKind::corrupt_stream),
-                fmt::format("{} is not sound: {}", options.input, counted(v.problems.size(), "problem")));
+                fmt::format("{} is not sound{}", options.input, advice_on(v, *input, options.input)));
 }
 
 }  // namespace

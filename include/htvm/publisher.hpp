@@ -49,6 +49,7 @@ struct PublisherState {
     std::optional<std::chrono::microseconds> round_trip;  // to the hub and back, once it is known
     std::optional<std::uint64_t> viewers;                 // by the hub's last heartbeat
     std::string trouble;                                  // why it is not connected, if so
+    bool is_over = false;  // it is not connected and tries no more: the stream ended, or was refused for good
 };
 
 class Publisher {

@@ -105,17 +105,23 @@ bool Mp4Packets::rebuild_parted(std::span<const std::uint8_t> parted, std::size_
     std::uint32_t payload_bytes = 0;
     if (!read_packet_header(header_bytes, payload_bytes) || payload_bytes < prefix || samples == 0) return false;
     if (payload_bytes > max_packet_bytes_) return true;
-    bool any = false;
+    bool any = false, is_cut_off = false;
     for (auto& other : others_) {
         if (tracks_[other.track].kind != kind) continue;
         any = true;
         const auto payload = find_payload(other, parted.last(prefix), payload_bytes, samples, crc);
-        if (!payload) continue;
+        if (!payload) {
+            const auto left = tracks_[other.track].samples.size() - other.next;
+            other.has_ended = other.has_ended || (missing_ > 0 && samples > left);
+            is_cut_off = is_cut_off || other.has_ended;
+            continue;
+        }
         out.insert(out.end(), header_bytes.begin(), header_bytes.end());
         out.insert(out.end(), payload->begin(), payload->end());
         for (int i = 0; i < 4; ++i) out.push_back(static_cast<std::uint8_t>(crc >> (8 * i)));
         return true;
     }
+    if (is_cut_off) cut_off_ += parted.size();
     return !any;
 }
 

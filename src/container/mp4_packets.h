@@ -19,6 +19,8 @@ public:
     std::optional<std::vector<std::uint8_t>> next();
     // Bytes that could not be read, and packets whose other part, in a track that is there, was not found.
     std::uint64_t damaged_bytes() const { return damaged_; }
+    // Among these, those of packets whose other part lies behind the end of a file that is cut short.
+    std::uint64_t cut_off_bytes() const { return cut_off_; }
     // Bytes behind the end of a file that is cut short.
     std::uint64_t missing_bytes() const { return missing_; }
 
@@ -27,6 +29,7 @@ private:
         std::size_t track = 0;
         std::size_t next = 0;                   // of its samples
         std::vector<std::uint64_t> ends = {0};  // bytes of the samples up to each
+        bool has_ended = false;                 // a packet was looked for behind its last sample
     };
     struct Rebuilt {
         std::vector<std::uint8_t> bytes;
@@ -39,7 +42,7 @@ private:
     std::vector<std::uint8_t> configuration(const Mp4Sample& first, bool has_header) const;
 
     FileBytes file_;
-    std::uint64_t max_packet_bytes_ = 0, damaged_ = 0, missing_ = 0;
+    std::uint64_t max_packet_bytes_ = 0, damaged_ = 0, cut_off_ = 0, missing_ = 0;
     std::uint64_t in_vain_ = 0;  // bytes read for packets that they are not of
     std::vector<Mp4Track> tracks_;
     std::size_t meshes_ = 0;  // which of the tracks

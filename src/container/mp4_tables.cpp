@@ -15,6 +15,8 @@ namespace {
 constexpr std::uint64_t most_table_bytes = std::uint64_t{1} << 29;
 
 tl::unexpected<Error> corrupt(const std::string& what) { return fail(ErrorKind::corrupt_stream, "the .mp4's " + what); }
+// Of a file without the box 'moov', which lists its frames.
+constexpr const char* tables_advice = "; without it none of its frames is found: fetch or write the file anew";
 
 // What a fragment takes where it says nothing itself.
 struct Defaults {
@@ -429,11 +431,14 @@ Result<Mp4Tables> read_mp4_tables(const FileBytes& file) {
             auto ok = movie ? read_movie(tables, inside) : read_fragment(tables, offset, inside);
             // What comes behind the last whole fragment was cut off.
             if (!ok && !movie && box->end == file.size && !tables.tracks.empty()) break;
+            if (!ok && movie && out.missing_bytes > 0)
+                return corrupt(std::string("box 'moov' is cut short") + tables_advice);
             if (!ok) return tl::unexpected(ok.error());
         }
         offset = box->end;
     }
-    if (!tables.has_movie) return corrupt("box 'moov' is missing: the file is cut short, or a piece of one");
+    if (!tables.has_movie)
+        return corrupt(std::string("box 'moov' is missing: the file is cut short, or a piece of one") + tables_advice);
     bool has_meshes = false;
     for (auto& track : tables.tracks) {
         has_meshes = has_meshes || track.track.kind == SampleTrack::meshes;

@@ -117,8 +117,11 @@ std::string timestamp_in_file(const std::filesystem::path& path) {
 Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options, MeshFindings* findings) {
     const auto format = format_of(path);
     if (!format) {
+        const auto ending = internal::lower_case(path.extension().string());
         return fail_at(path, ErrorKind::unsupported,
-                       "the name ends in none of " + std::string(mesh_file_extensions) + ", the formats that are read");
+                       ending == ".htvm" ? "it is no mesh but a stream, which is to be decoded first"
+                                         : "the name ends in none of " + std::string(mesh_file_extensions) +
+                                               ", the formats that are read");
     }
     const auto bytes = read_file(path);
     if (!bytes) return tl::unexpected(bytes.error());

@@ -60,13 +60,13 @@ double share_on_border(std::span<const Vector3f> positions, std::span<const Tria
     return all == 0 ? 0 : static_cast<double>(open) / static_cast<double>(all);
 }
 
-bool comes_and_goes(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
+Openness openness_of(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
     constexpr double open = 0.02;             // share of the vertices on a border
     constexpr double piece = 1.0 / 400;       // of the area: a hand is twice as large, a speck a tenth
     constexpr std::size_t fewest_pieces = 5;  // a person, another one, a chair, a ball are four
     const auto is_wrong = [&](const Triangle& t) { return std::ranges::max(t) >= positions.size(); };
-    if (std::ranges::any_of(triangles, is_wrong)) return false;
-    if (share_on_border(positions, triangles) > open) return true;
+    if (std::ranges::any_of(triangles, is_wrong)) return Openness::closed;
+    if (share_on_border(positions, triangles) > open) return Openness::bordered;
     const auto place = first_equal(positions);
     DisjointSets pieces(positions.size());
     std::vector<double> area(positions.size(), 0);
@@ -77,8 +77,8 @@ bool comes_and_goes(std::span<const Vector3f> positions, std::span<const Triangl
         area[pieces.of(place[t[0]])] += own;
         all += own;
     }
-    return static_cast<std::size_t>(std::ranges::count_if(area, [&](double a) { return a > piece * all; })) >=
-           fewest_pieces;
+    const auto large = std::ranges::count_if(area, [&](double a) { return a > piece * all; });
+    return static_cast<std::size_t>(large) >= fewest_pieces ? Openness::in_pieces : Openness::closed;
 }
 
 }  // namespace htvm::internal

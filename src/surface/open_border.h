@@ -22,9 +22,15 @@ std::vector<std::uint8_t> edges_from_border(std::span<const Vector3f> positions,
 // 0.03 to 0.2 for views of depth cameras.
 double share_on_border(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
 
-// Whether a capture that begins with this mesh is one of surface that comes and goes: where it has borders, or is in
+enum class Openness : std::uint8_t { closed, bordered, in_pieces };
+
+// What a capture is that begins with this mesh: one of surface that comes and goes where it has borders, or is in
 // pieces, as what a depth camera sees of a person is even if each piece was closed. Nothing else but people and what
-// they hold comes in so many. positions: of any unit. False where triangles name vertices that do not exist.
-bool comes_and_goes(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
+// they hold comes in so many. positions: of any unit. Closed where triangles name vertices that do not exist.
+Openness openness_of(std::span<const Vector3f> positions, std::span<const Triangle> triangles);
+
+inline bool comes_and_goes(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
+    return openness_of(positions, triangles) != Openness::closed;
+}
 
 }  // namespace htvm::internal

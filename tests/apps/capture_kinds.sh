@@ -80,6 +80,24 @@ change farther 'number = "double"; v = [[row[0] / 1000 + 3e7, row[1] / 1000, row
 expect 0 "M2" "$htvm" compare survey survey.htvm --unit m --only m2
 expect 0 "M2" "$htvm" compare survey surveyed --unit m --only m2
 
+# A report tells the same height as encode, along --up; and why frames say what is there, where they do: of closed pieces
+# there is no border.
+millimetres() { # "m" or "cm" behind a number
+    awk '{ printf "%d", $1 * ($2 == "m" ? 1000 : 10) + 0.5 }'
+}
+for up in x y -z; do
+    told=$("$htvm" encode near --up=$up --frames 1 -o x.htvm 2>&1 | sed -n 's/.* makes the subject \([0-9.]* c*m\) tall.*/\1/p' | millimetres)
+    checked=$("$htvm" check near --up=$up --frames 1 --trial 0 2>/dev/null | sed -n 's/^  size *\([0-9]*\) mm tall.*/\1/p')
+    [ -n "$told" ] && [ $((told - checked)) -ge -6 ] && [ $((told - checked)) -le 6 ] || fail "along $up: $told mm by encode, $checked by check"
+done
+expect 0 "  surface      closed, or nearly so" "$htvm" check near --trial 0
+for i in 0 1 2 3 4 5; do # tetrahedra
+    printf 'v %d 0 0\nv %d 0 0\nv %d 900 0\nv %d 0 900\n' $((i * 1000)) $((i * 1000 + 900)) $((i * 1000)) $((i * 1000))
+    printf 'f -4 -2 -3\nf -4 -3 -1\nf -4 -1 -2\nf -3 -2 -1\n'
+done >pieces.obj
+expect 0 "  surface      in pieces, as where depth cameras see a person" "$htvm" check pieces.obj --trial 0
+expect 0 "  border       0.00 m" "$htvm" check pieces.obj --trial 0
+
 # A stream under another format's name.
 for name in x.glb x.mkv x.wav x.PNG x.zip; do
     expect 1 "give one that ends in .htvm" "$htvm" encode capture -o $name

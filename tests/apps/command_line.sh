@@ -243,6 +243,19 @@ expect 0 "--still-below" "$htvm" encode --help-all
 expect 0 "5 limit exceeded, or frames dropped to keep to a bitrate, 6 disk full" "$htvm" help
 expect 0 "the exit code is 0, as they were dropped by wish" "$htvm" encode --help-all
 expect 2 "did you mean 'encode'?" "$htvm" help encod
+# Every command takes --help-all, and lists it where there is more to show than by --help alone.
+for command in synth check encode decode info calibrate compare cut join pack index verify still render play demo serve publish link; do
+    expect 0 "Usage: htvm $command" "$htvm" $command --help-all
+done
+expect 0 "Usage: htvm" "$htvm" --help-all
+"$htvm" info --help | grep -q -- "--help-all" && fail "info lists --help-all, which shows no more"
+# As with cp: the last word is the output.
+expect 2 "--output is required; did you mean -o new.htvm?" "$htvm" encode capture new.htvm
+expect 2 "did you mean -o new.mp4?" "$htvm" pack a.htvm new.mp4
+expect 2 "did you mean -o meshes?" "$htvm" decode a.htvm meshes
+"$htvm" encode capture capture 2>&1 | grep -q "did you mean -o" && fail "a file that is there is taken for the output"
+expect 2 "what to do with a file comes first: 'htvm play FILE' shows it" "$htvm" capture
+expect 2 "say where to, behind the file: ws://HOST:PORT/publish/NAME" "$htvm" publish a.htvm
 [ "$("$htvm" -V)" = "$("$htvm" --version)" ] || fail "-V is not --version"
 [ -z "$("$htvm" encode capture -o quiet.htvm --quiet 2>&1)" ] || fail "--quiet says something"
 expect 2 "sideways is not a number" "$htvm" play a.htvm --orbit sideways

@@ -200,6 +200,19 @@ expect 3 "not part of an undamaged packet" "$htvm" verify poisoned.htvm
 expect 3 '"sound": false' "$htvm" verify poisoned.htvm --json
 head -c $((end - 10)) walk.htvm >short.htvm
 expect 3 "ends in the middle of a packet" "$htvm" verify short.htvm
+# Of a stream whose end is missing: where it ends, how much is whole, and how to keep that.
+head -c $((end / 2)) walk.htvm >half.htvm
+whole=$("$htvm" verify half.htvm --json 2>/dev/null | sed -n 's/^  "frames": \([0-9]*\),/\1/p')
+[ "$whole" -gt 0 ] && [ "$whole" -lt 12 ] || fail "half a stream has $whole frames"
+expect 3 "$whole of 12 frames" "$htvm" verify half.htvm
+expect 3 "whole, up to frame $((whole - 1)) at" "$htvm" verify half.htvm
+expect 3 "behind the last whole one" "$htvm" verify half.htvm
+expect 3 "half.htvm is not sound; 'htvm join half.htvm -o whole.htvm' copies what is whole" "$htvm" verify half.htvm
+expect 0 "whole.htvm: $whole frame" "$htvm" join half.htvm -o whole.htvm
+expect 0 "all sound" "$htvm" verify whole.htvm
+head -c 250 walk.htvm >headless.htvm
+expect 3 "0 frames were decoded, 12 others are lost" "$htvm" decode headless.htvm -o x
+expect 3 "it is no htvm stream: no sequence header was found" "$htvm" verify capture/skeleton.json
 gone=($(place 7 5))
 { head -c "${gone[0]}" walk.htvm; tail -c +$((gone[0] + gone[1] + 1)) walk.htvm; } >lost.htvm
 expect 3 "frame 6: comes after frame 4: frames are missing between them" "$htvm" verify lost.htvm

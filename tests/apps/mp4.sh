@@ -33,7 +33,7 @@ expect 0 "60 frames" "$htvm" join person.mp4 part.mp4 -o joined.mp4
 # ---- What is no such file -------------------------------------------------------------------------------------------
 
 head -c 600 direct.mp4 >cut.mp4
-expect 3 "cut.mp4: the .mp4's" "$htvm" info cut.mp4
+expect 3 "cut.mp4: the .mp4's box 'moov' is cut short; without it none of its frames is found" "$htvm" info cut.mp4
 # One that is cut short is decoded as far as it is whole, which is said.
 "$htvm" decode person.htvm -o of_htvm 2>/dev/null
 # The mesh of the whole stream, but for its picture, which may be cut off.
@@ -44,6 +44,11 @@ for kind in "" "--fragmented --fragment 0.4"; do
     head -c $(($(stat -c %s whole.mp4) * 2 / 3)) whole.mp4 >cut.mp4
     rm -rf of_mp4
     expect 3 "cut.mp4 is cut short: its end, " "$htvm" decode cut.mp4 -o of_mp4
+    expect 3 "the file is cut short: its end, " "$htvm" verify cut.mp4
+    expect 3 " of 45 frames are whole, up to frame " "$htvm" verify cut.mp4
+    expect 3 "'htvm join cut.mp4 -o whole.htvm' copies what is whole" "$htvm" verify cut.mp4
+    expect 0 "is missing, and is left out" "$htvm" join cut.mp4 -o kept.htvm
+    expect 0 "all sound" "$htvm" verify kept.htvm
     frames=$(ls of_mp4/*.ply 2>/dev/null | wc -l)
     [ "$frames" -ge 10 ] && [ "$frames" -lt 45 ] || fail "$frames frames come of an .mp4 ($kind) that is cut short"
     for mesh in of_mp4/*.ply; do same_mesh "$mesh" || fail "$mesh of an .mp4 ($kind) that is cut short"; done
@@ -83,6 +88,7 @@ head -c $(($(stat -c %s whole.m4s) / 2)) whole.m4s >"www/$segment"
 decode_lossy "names $segment, which is cut short" 31
 rm "www/$segment"
 decode_lossy "names $segment, which is not there; 30 frames were decoded" 30
+expect 3 "names $segment, which is not there" "$htvm" verify www/person.m3u8
 cp whole.m4s "www/$segment"
 first=$(grep '^000000' www/person.m3u8)
 mv "www/$first" first.m4s
@@ -92,6 +98,12 @@ mkdir many
 "$htvm" pack person.htvm -o many/person.m3u8 --segment 0.3 2>/dev/null
 rm many/000001-*.m4s many/000003-*.m4s
 expect 3 "1 segment more is left out, too" "$htvm" decode many/person.m3u8 -o of_many
+expect 3 "which is not there; 2 segments in all are gone or cut short" "$htvm" verify many/person.m3u8
+rm many/*.m4s
+for command in verify info "decode -o x"; do
+    # shellcheck disable=SC2086
+    expect 3 ", which is not there" "$htvm" $command many/person.m3u8
+done
 printf '#EXTM3U\n#EXT-X-MAP:URI="../../etc/passwd"\n#EXTINF:1,\na.m4s\n' >outside.m3u8
 expect 1 "which is not a file beside it" "$htvm" info outside.m3u8
 

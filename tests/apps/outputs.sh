@@ -85,7 +85,18 @@ expect 6 "standard output cannot be written: No space left" full decode good.htv
 expect 6 "standard output cannot be written: No space left" full info good.htvm
 expect 1 "there is no folder nowhere; make it first" "$htvm" encode capture -o nowhere/x.htvm
 mkdir folder.htvm
-expect 1 "folder.htvm cannot be written" "$htvm" encode capture -o folder.htvm
+expect 1 "folder.htvm cannot be written: it is a folder; give the stream a name" "$htvm" encode capture -o folder.htvm
+
+# A stream is called .htvm, .mp4 or .m3u8, or has no ending: another one is a mistake, of which nothing is written. A
+# stream that is there keeps its name, whatever it is.
+for command in "encode capture" "cut good.htvm" "join good.htvm" "pack good.htvm" "index good.htvm"; do
+    # shellcheck disable=SC2086
+    expect 1 "x.foo: .foo is no ending of a stream; give .htvm, .mp4, or .m3u8" "$htvm" $command -o x.foo
+done
+[ ! -e x.foo ] || fail "a stream is written to x.foo"
+expect 0 "2 frames" "$htvm" cut good.htvm -o ending_of_none
+cp good.htvm good.bin
+expect 0 "good.bin: an index of 2 frames" "$htvm" index good.bin
 
 # Meshes and reports likewise.
 "$htvm" decode good.htvm -o meshes --quiet
@@ -93,5 +104,20 @@ expect 1 "folder.htvm cannot be written" "$htvm" encode capture -o folder.htvm
 "$htvm" calibrate capture -s capture/skeleton.json -o radii.json --quiet
 [ "$(ls meshes | tr '\n' ' ')" = "00000.ply 00001.ply " ] && [ -s errors.csv ] && [ -s radii.json ] &&
     [ -z "$(find . -name '*.partial')" ] || fail "meshes or reports are not in their place: $(ls meshes)"
+
+# What an earlier run left beside the frames is named, by number: whoever reads the folder takes it for part of the
+# capture. Folders and files that no frame is called after are none of it.
+[ -z "$("$htvm" decode good.htvm -o meshes --quiet 2>&1)" ] || fail "a decode of the same frames warns of itself"
+"$htvm" encode capture -o six.htvm --quiet
+"$htvm" decode six.htvm -o used --quiet
+mkdir used/folder.ply && touch used/poster.png used/00001.png
+expect 0 "used holds 4 meshes (00002.ply, 00003.ply, 00004.ply and 1 other) and 1 image (00001.png) that this run did not write" \
+    "$htvm" decode good.htvm -o used
+"$htvm" decode six.htvm -o 'used/%d.obj' --quiet
+expect 0 "used holds 4 meshes (2.obj, 3.obj, 4.obj and 1 other) that" "$htvm" decode good.htvm -o 'used/%d.obj'
+"$htvm" synth textured --frames 3 --vertices 600 --texture 64 --quiet
+[ -z "$("$htvm" synth textured --frames 3 --vertices 600 --texture 64 --quiet 2>&1)" ] || fail "synth warns of its own images"
+expect 0 "textured holds 1 mesh (frame_00002.ply) and 1 image (frame_00002.jpg) that" \
+    "$htvm" synth textured --frames 2 --vertices 600 --texture 64
 
 done_with "files are there in whole or not at all"

@@ -101,6 +101,8 @@ for choice in "=0,255,0" "--frame 17=255,0,0" "--frame 19=0,0,255" "--time 0.04=
     "$htvm" still squares -o one.png "${small[@]}" ${choice%=*} --quiet || fail "still squares ${choice%=*}"
     shows one.png "60x40 ${choice#*=}" 30,20
 done
+expect 0 "frame 19 of squares, its last, as it ends before that time" "$htvm" still squares -o one.png --time 9
+"$htvm" still squares -o one.png --time 0.09 2>&1 | grep -q "its last" && fail "the last frame is not shown for its time"
 expect 1 "squares has no frame 0; its frames are 17 to 19" "$htvm" still squares --frame 0 -o none.png
 expect 0 '"frame": 18' "$htvm" still squares -o one.png --json
 expect 4 "pictures are written as .png, not as one.jpg" "$htvm" still squares -o one.jpg

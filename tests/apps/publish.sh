@@ -67,12 +67,27 @@ grep -q 'trying again' again.err || fail "the viewer does not say that the hub w
 kill -INT "$publisher"
 wait "$publisher"
 [ $? -eq 0 ] || fail "htvm publish --loop after Ctrl-C: $(cat published.err)"
+grep -q "connected to ws://$address/publish/walk" published.err || fail "a publisher does not say that its hub is back: $(cat published.err)"
 python3 - <<'PYTHON' || fail "htvm publish --json"
 import json
 lines = [json.loads(line) for line in open("published")]
 assert lines[-1]["frames"] > 90 and lines[-1]["rounds"] >= 7 and lines[-1]["connections"] == 2, lines[-1]
 assert any(line["round_trip_ms"] is not None for line in lines)
 PYTHON
+
+# A hub takes the connection before it judges the stream. Of one that is another's, what is said is that it is refused,
+# once, and never that it is connected.
+"$htvm" publish walk.htvm "ws://$address/publish/taken" --loop 2>taken.err &
+publisher=$!
+started+=("$publisher")
+"$htvm" decode "ws://$address/watch/taken" --frames 1 -o taken 2>/dev/null || fail "nobody publishes: $(cat taken.err)"
+"$htvm" publish walk.htvm "ws://$address/publish/taken" --loop 2>refused.err
+[ $? -eq 1 ] || fail "a second publisher of a stream is not refused: $(cat refused.err)"
+grep -q "connected to" refused.err && fail "a publisher that is refused says that it is connected: $(cat refused.err)"
+[ "$(grep -c "is being published by another session; end that one, or wait; trying again" refused.err)" -eq 1 ] ||
+    fail "a publisher that is refused says so not once: $(cat refused.err)"
+kill -INT "$publisher"
+wait "$publisher"
 
 # From a file at the time of its frames: twelve of them last 0.4 s.
 begun=$(date +%s%N)
@@ -118,6 +133,8 @@ if command -v openssl >/dev/null; then
     expect 1 "is not trusted" "$htvm" decode "wss://localhost:${address##*:}/watch/walk" --ca cert.pem -o nothing
     expect 1 "401" env HTVM_TOKEN=wrong "$htvm" publish walk.htvm "wss://$address/publish/walk" --ca cert.pem
     expect 1 "401" "$htvm" publish walk.htvm "wss://$address/publish/walk" --insecure
+    "$htvm" publish walk.htvm "wss://$address/publish/walk" --insecure 2>&1 | grep -q "trying again" &&
+        fail "what is refused for good is said to be tried again"
     kill -INT "$publisher"
 else
     echo "openssl is not installed: TLS is not tried"

@@ -121,10 +121,11 @@ inline Result<Bytes> mp4_of(const std::vector<Packet>& packets, const Mp4Options
     return out;
 }
 
-// The bytes of the stream in an .mp4, how many are said to be damaged, and how many of the file to be missing.
+// The bytes of the stream in an .mp4, how many are said to be damaged, and of these to be cut off, and how many
+// of the file to be missing.
 struct Unpacked {
     Bytes bytes;
-    std::uint64_t damaged = 0, missing = 0;
+    std::uint64_t damaged = 0, cut_off = 0, missing = 0;
 };
 inline Result<Unpacked> unpacked(std::span<const std::uint8_t> mp4, bool goes_on = false) {
     auto packets = Mp4Packets::open(htvm::source_of(mp4), std::uint64_t{1} << 28, goes_on);
@@ -133,6 +134,7 @@ inline Result<Unpacked> unpacked(std::span<const std::uint8_t> mp4, bool goes_on
     while (const auto bytes = packets->next()) out.bytes.insert(out.bytes.end(), bytes->begin(), bytes->end());
     out.damaged = packets->damaged_bytes();
     out.missing = packets->missing_bytes();
+    out.cut_off = packets->cut_off_bytes();
     return out;
 }
 

@@ -222,6 +222,10 @@ TEST(Mp4, cut_short_gives_the_frames_that_are_whole_and_says_what_is_missing) {
             if (!fragmented) {
                 ASSERT_EQ(back->missing, mp4.size() - size);
             }
+            // Nothing is damaged but what lies in part behind the end.
+            if (!fragmented) {
+                ASSERT_EQ(back->damaged, back->cut_off) << size;
+            }
             if (back->damaged != 0) continue;
             ASSERT_TRUE(std::equal(back->bytes.begin(), back->bytes.end(), stream.begin())) << size;
         }

@@ -159,9 +159,11 @@ HubTalk Publisher::State::talk() {
     };
     out.lost = [this](const HubEnding& why) { disconnect(why.reason); };
     out.ended = [this](const HubEnding& why) {
+        {
+            const std::lock_guard lock(mutex);
+            ending = why;
+        }
         disconnect(why.reason);
-        const std::lock_guard lock(mutex);
-        ending = why;
         changed.notify_all();
     };
     return out;
@@ -238,6 +240,7 @@ PublisherState Publisher::state() const {
     }
     out.viewers = state.viewers;
     out.trouble = state.trouble;
+    out.is_over = state.ending.has_value();
     return out;
 }
 
