@@ -64,6 +64,10 @@ hub serve_again "${address##*:}"
 wait "$viewer"
 [ $? -le 3 ] && [ "$(find again -name '*.ply' | wc -l)" -eq 60 ] || fail "a viewer of a hub that is back: $(cat again.err)"
 grep -q 'trying again' again.err || fail "the viewer does not say that the hub was lost: $(cat again.err)"
+for _ in {1..100}; do # it says so once the hub has kept it for a second
+    grep -q "connected to ws://$address/publish/walk" published.err && break
+    sleep 0.1
+done
 kill -INT "$publisher"
 wait "$publisher"
 [ $? -eq 0 ] || fail "htvm publish --loop after Ctrl-C: $(cat published.err)"
