@@ -127,7 +127,7 @@ std::string in_words(const CLI::App& app, const CLI::Error& error) {
     return said == "A subcommand is required" ? "a command is required" : said;
 }
 
-// Of a command that lacks its -o, the word behind its input that is no file yet, as in "cp FROM TO"; or empty.
+// The word behind a command's input that is no file yet, where it lacks its -o, as in "cp FROM TO"; or empty.
 std::string meant_output(const CLI::App& command) {
     const auto& remaining = command.remaining();
     std::vector<std::string> words(remaining.begin(), remaining.end());

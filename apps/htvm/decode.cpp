@@ -374,7 +374,7 @@ Result<bool> decode_next(Decoding& d) {
     }
     if (!packet) {
         const auto promised = static_cast<std::uint32_t>(std::min<std::uint64_t>(d.promised, 0xFFFFFFFF));
-        // Of a stream that ends before its first frame, all that its index tells of is missing.
+        // Where a stream ends before its first frame, all that its index tells of is missing.
         if (d.next_number == 0) d.summary.missing = promised;
         if (auto ok = fill_gap(d, promised, d.summary.timestamp_us.value_or(0), false); !ok)
             return tl::unexpected(ok.error());

@@ -227,7 +227,7 @@ Result<void> publish(const Options& options) {
     return {};
 }
 
-// Of a ladder any number of files are named, and the hubs behind them.
+// A ladder names any number of files, and the hubs behind them.
 void tell_files_from_hubs(Options& options) {
     const auto is_hub = [](const std::string& one) { return destination_of(one).is_hub(); };
     const auto first = std::find_if(options.hubs.begin(), options.hubs.end(), is_hub);

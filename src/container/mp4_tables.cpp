@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint64_t most_table_bytes = std::uint64_t{1} << 29;
 
 tl::unexpected<Error> corrupt(const std::string& what) { return fail(ErrorKind::corrupt_stream, "the .mp4's " + what); }
-// Of a file without the box 'moov', which lists its frames.
+// What to do about a file without the box 'moov', which lists its frames.
 constexpr const char* tables_advice = "; without it none of its frames is found: fetch or write the file anew";
 
 // What a fragment takes where it says nothing itself.

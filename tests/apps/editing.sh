@@ -200,7 +200,7 @@ expect 3 "not part of an undamaged packet" "$htvm" verify poisoned.htvm
 expect 3 '"sound": false' "$htvm" verify poisoned.htvm --json
 head -c $((end - 10)) walk.htvm >short.htvm
 expect 3 "ends in the middle of a packet" "$htvm" verify short.htvm
-# Of a stream whose end is missing: where it ends, how much is whole, and how to keep that.
+# Where a stream ends that is cut short, how much of it is whole, and how to keep that.
 head -c $((end / 2)) walk.htvm >half.htvm
 whole=$("$htvm" verify half.htvm --json 2>/dev/null | sed -n 's/^  "frames": \([0-9]*\),/\1/p')
 [ "$whole" -gt 0 ] && [ "$whole" -lt 12 ] || fail "half a stream has $whole frames"

@@ -79,8 +79,8 @@ assert lines[-1]["frames"] > 90 and lines[-1]["rounds"] >= 7 and lines[-1]["conn
 assert any(line["round_trip_ms"] is not None for line in lines)
 PYTHON
 
-# A hub takes the connection before it judges the stream. Of one that is another's, what is said is that it is refused,
-# once, and never that it is connected.
+# A hub takes the connection before it judges the stream. Who publishes one that is another's says once that it is
+# refused, and never that it is connected.
 "$htvm" publish walk.htvm "ws://$address/publish/taken" --loop 2>taken.err &
 publisher=$!
 started+=("$publisher")
