@@ -37,7 +37,7 @@ if [ "$base" = debian ]; then
 fi
 
 # Docker's format: that of OCI has no health checks.
-nice buildah bud --layers --format docker ${runtime:+--runtime "$runtime"} ${HTVM_CCACHE:+--volume "$HTVM_CCACHE:/root/.cache/ccache"} \
+nice buildah bud --layers --format docker ${runtime:+--runtime "$runtime"} ${HTVM_CCACHE:+--volume "$HTVM_CCACHE:/ccache"} \
     --build-arg BASE="$base" -f packaging/Containerfile -t "$image" . >"$work/log" 2>&1 || { cat "$work/log"; fail "the image is built"; }
 
 # As it is meant to be run, on a network of its own, with a root that nobody can write to.

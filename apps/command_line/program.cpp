@@ -261,10 +261,6 @@ int exit_with(const Program& program, const Error& error) {
     return interruption() != 0 ? 128 + interruption() : exit_code(error.kind);
 }
 
-}  // namespace
-
-namespace {
-
 // A command whose --help shows all it has takes --help-all, too: who knows it of one command tries it with others.
 void accept_help_all(CLI::App& command) {
     if (command.get_option_no_throw("--help-all")) return;

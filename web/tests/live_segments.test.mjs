@@ -146,18 +146,7 @@ test('a viewer in Chromium goes back within the window, and returns to live', op
     await there(address);
     await page.goto(`${server.origin}/page.html`);
     await page.waitForFunction(() => window.ready);
-    await page.evaluate((src) => {
-        const player = document.createElement('htvm-player');
-        Object.assign(window, { player, shown: [], notices: [] });
-        player.addEventListener('framepresented', ({ detail }) => window.shown.push({ frame: detail.frame, time: detail.time, preview: detail.preview }));
-        player.addEventListener('notice', ({ detail }) => window.notices.push(detail));
-        player.addEventListener('error', ({ detail }) => window.notices.push(detail.message));
-        player.setAttribute('floor', 'none');
-        player.src = src;
-        player.muted = true;
-        document.body.append(player);
-        player.play();
-    }, address);
+    await page.evaluate((src) => test.watch(src), address);
     const shownFrom = (time) => page.waitForFunction((from) => window.shown.filter((one) => !one.preview && one.time >= from).length >= 10, time);
     await shownFrom(0);
     const joined = await page.evaluate(() => ({ ...window.shown.find(({ preview }) => !preview), live: window.player.statistics.ladder.live, duration: window.player.duration }));

@@ -82,22 +82,15 @@ const here = `http://127.0.0.1:${server.address().port}`;
 
 // In the page: plays, and notes what happens.
 function watch(src) {
-    const player = document.createElement('htvm-player');
-    Object.assign(window, { player, frames: [], notices: [], ladder: [], begun: Date.now() });
-    player.addEventListener('framepresented', ({ detail }) => {
-        const { ladder } = player.statistics;
+    Object.assign(window, { frames: [], ladder: [], begun: Date.now() });
+    window.test.watch(src);
+    window.player.addEventListener('framepresented', ({ detail }) => {
+        const { ladder } = window.player.statistics;
         if (!detail.preview) window.frames.push({ at: Date.now(), time: detail.time, behind: ladder?.secondsBehind ?? null });
         const last = window.ladder.at(-1);
         if (ladder && (last?.fetched !== ladder.fetched || last?.shown !== ladder.shown))
             window.ladder.push({ at: Date.now(), fetched: ladder.fetched, shown: ladder.shown, reason: ladder.reason, ahead: ladder.secondsFetched });
     });
-    player.addEventListener('notice', ({ detail }) => window.notices.push(detail));
-    player.addEventListener('error', ({ detail }) => window.notices.push(detail.message));
-    player.setAttribute('floor', 'none');
-    player.src = src;
-    player.muted = true;
-    document.body.append(player);
-    player.play();
 }
 const found = () => ({ frames: window.frames, notices: window.notices, ladder: window.ladder, begun: window.begun, last: window.player.statistics.ladder });
 

@@ -112,23 +112,12 @@ test('segments of a live ladder play on, each frame at its time', withProgram, a
     const [line] = await once(start('serve', '--port', '0', '--segments', '1', '--origin', server.origin).stdout, 'data');
     const hub = /http:\/\/[^/\s]+/.exec(String(line))[0];
     start('publish', join(work, 'person.m3u8'), '--ladder', `${hub.replace('http', 'ws')}/publish/anna`, '--loop');
-    await inPage(async (src) => {
-        window.test.player?.remove();
-        const player = document.createElement('htvm-player');
-        Object.assign(window, { player, shown: [], notices: [] });
-        player.addEventListener('framepresented', ({ detail }) => !detail.preview && window.shown.push(detail.time));
-        player.addEventListener('notice', ({ detail }) => window.notices.push(detail));
-        player.addEventListener('error', ({ detail }) => window.notices.push(detail.message));
-        player.setAttribute('floor', 'none');
-        player.src = src;
-        player.muted = true;
-        document.body.append(player);
-        player.play();
-    }, `${hub}/hls/anna/master.m3u8`);
+    await inPage(async (src) => test.watch(src), `${hub}/hls/anna/master.m3u8`);
     const look = () =>
         inPage(async () => {
             const { ladder } = window.player.statistics;
-            return { shown: window.shown, notices: window.notices, live: ladder?.live, lost: ladder?.lostSegments, rungs: ladder?.rungs.length };
+            const shown = window.shown.filter(({ preview }) => !preview).map(({ time }) => time);
+            return { shown, notices: window.notices, live: ladder?.live, lost: ladder?.lostSegments, rungs: ladder?.rungs.length };
         });
     let played = await look();
     while (!(played.shown.at(-1) >= played.shown[0] + 5)) {

@@ -36,6 +36,21 @@ const test = {
         await player.idle();
     },
 
+    /** A new player that plays by the real time, in place of the one before: `window.player`. `window.shown` has its frames, `window.notices` what it says. */
+    watch(src) {
+        player?.remove();
+        player = document.createElement('htvm-player');
+        Object.assign(window, { player, shown: [], notices: [] });
+        player.addEventListener('framepresented', ({ detail }) => window.shown.push({ frame: detail.frame, time: detail.time, preview: detail.preview }));
+        player.addEventListener('notice', ({ detail }) => window.notices.push(detail));
+        player.addEventListener('error', ({ detail }) => window.notices.push(detail.message));
+        player.setAttribute('floor', 'none');
+        player.src = src;
+        player.muted = true;
+        document.body.append(player);
+        player.play();
+    },
+
     /** Lets the clock run, a part of a frame at a time, until playback pauses or `milliseconds` are over. */
     async run(milliseconds = Infinity, step = 15) {
         for (let left = milliseconds; left > 0 && !player.paused; left -= step) {
