@@ -496,6 +496,39 @@ inPage('a frame without a picture shows the last one; gains raise what is decode
     }
 });
 
+inPage('from afar a pixel is the mean of its texels, and not of what lies beyond the gutter of a chart', async (page) => {
+    // Lines of one texel, and eight texels of grey between them and green: as two charts lie.
+    const bytes = await page.evaluate(async () => {
+        const canvas = new OffscreenCanvas(256, 256);
+        const context = canvas.getContext('2d');
+        const fill = (colour, from, width) => {
+            context.fillStyle = colour;
+            context.fillRect(from, 0, width, 256);
+        };
+        for (let x = 0; x < 124; ++x) fill(x % 2 === 0 ? 'black' : 'white', x, 1);
+        fill('rgb(128,128,128)', 124, 8);
+        fill('rgb(0,255,0)', 132, 124);
+        return [...new Uint8Array(await (await canvas.convertToBlob({ type: 'image/png' })).arrayBuffer())];
+    });
+    server.made.set('lines.htvm', withPictures('PNG', pictures.PNG.map(() => ({ key: true, bytes })), { width: 256, height: 256 }));
+    await openPlayer(page, 'lines');
+    const drawn = await page.evaluate(async () => {
+        Object.assign(test.player.style, { width: '64px', height: '64px' });
+        await new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve))); // until its size is observed
+        await test.player.idle();
+        const bitmap = await createImageBitmap(await test.player.screenshot());
+        const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+        context.drawImage(bitmap, 0, 0);
+        const middle = [...context.getImageData(0, bitmap.height / 2, bitmap.width, 1).data];
+        return Array.from({ length: bitmap.width }, (_, x) => middle.slice(4 * x, 4 * x + 4)).filter(([, , , alpha]) => alpha === 255).map((rgba) => rgba.slice(0, 3));
+    });
+    const texels = 256 / drawn.length; // of a pixel
+    assert.ok(texels > 4 && texels < 8, `${drawn.length} pixels`);
+    const half = Math.floor(drawn.length / 2);
+    for (const [x, rgb] of drawn.slice(1, half - 1).entries()) for (const value of rgb) assert.ok(Math.abs(value - 128) < 40, `pixel ${x + 1}: ${rgb}`);
+    for (const [x, rgb] of drawn.slice(half + 2, -1).entries()) assert.deepEqual(rgb, [0, 255, 0], `pixel ${half + 2 + x}`);
+});
+
 inPage('pictures of frames that a seek leaves out are decoded for those that need them', async (page) => {
     server.made.set('own.htvm', withPictures('AV1', pictures.own, { of: ownMeshes }));
     const frame = frames - 2;
