@@ -10,6 +10,12 @@
 #include "texture/foreseeing_av1.h"
 
 namespace htvm::app {
+namespace {
+
+// VP9 at its finest takes little; AV1 with foresight would take ten times as long as to encode the meshes.
+int speed_of(PictureCoder coder) { return coder == PictureCoder::vp9 ? 5 : 8; }
+
+}  // namespace
 
 PictureTranscoding::PictureTranscoding(PictureTranscodingOptions options)
     : options_(std::move(options)), decoder_(PictureDecoderOptions{.threads = 0}) {}
@@ -70,6 +76,7 @@ Result<void> PictureTranscoding::begin(std::uint32_t width, std::uint32_t height
     options.height = height;
     options.frames_per_second = frames_per_second;
     options.quantiser = static_cast<int>(std::clamp(std::lround(options_.quantiser), 1L, 63L));
+    options.speed = speed_of(options_.coder);
     options.foresight = options_.coder == PictureCoder::av1 && can_foresee(width, height);
     auto encoder = PictureEncoder::create(options);
     if (!encoder) return tl::unexpected(encoder.error());
