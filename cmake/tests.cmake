@@ -68,13 +68,13 @@ htvm_tests(metrics htvm_metrics)
 htvm_tests(live htvm_live htvm_c_live)
 htvm_tests(apps htvm_app)
 htvm_tests(lab htvm_laboratory)
-foreach(name command_line captures capture_kinds recordings efforts textures textured_streams film synthetic coverage outputs editing jobs chunks audio mp4 gltf pictures publish serve use)
+foreach(name command_line captures capture_kinds recordings efforts textures textured_streams transcode film synthetic coverage outputs editing jobs chunks audio mp4 gltf pictures publish serve use)
   add_test(NAME ${name} COMMAND ${PROJECT_SOURCE_DIR}/tests/apps/${name}.sh $<TARGET_FILE:htvm>)
 endforeach()
 add_test(NAME lab_command_line COMMAND ${PROJECT_SOURCE_DIR}/tests/lab/command_line.sh $<TARGET_FILE:htvm-lab>
                                        $<TARGET_FILE:htvm>)
 add_test(NAME real_captures COMMAND ${PROJECT_SOURCE_DIR}/tests/apps/real_captures.sh $<TARGET_FILE:htvm>)
-set_tests_properties(command_line captures synthetic outputs gltf pictures lab_command_line real_captures PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+set_tests_properties(command_line captures synthetic outputs gltf pictures transcode lab_command_line real_captures PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 # COST: the longest tests start first.
 set_tests_properties(real_captures command_line captures PROPERTIES COST 90)
 add_test(NAME c_examples COMMAND ${PROJECT_SOURCE_DIR}/tests/c_api/examples.sh $<TARGET_FILE:example_encode>

@@ -420,6 +420,9 @@ void Capture::decide_texture() {
     if (texture_as_ != TextureAs::by_default || !peeked_->texture) return;
     texture_as_ = peeked_->mesh.colours.empty() ? options_.of_images : TextureAs::colours;
     if (texture_as_ == TextureAs::picture && is_film(*peeked_)) texture_as_ = TextureAs::projection;
+    if (!keeps_pictures(texture_as_) || !options_.pictures_too_slow) return;
+    options_.why_no_pictures = options_.pictures_too_slow(*peeked_, texture_as_, 1000 / rate_.per_second());
+    if (!options_.why_no_pictures.empty()) texture_as_ = TextureAs::colours;
 }
 
 // From the first mesh, in its file's unit.

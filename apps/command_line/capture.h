@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -74,7 +75,11 @@ struct CaptureOptions {
     // What becomes of them by default: colours, picture, which is projection where they are one camera's film, or
     // captured.
     TextureAs of_images = TextureAs::colours;
-    std::string why_no_pictures;             // where these are colours, for people; empty: nobody expects pictures
+    std::string why_no_pictures;  // where these are colours, for people; empty: nobody expects pictures
+    // Where these are pictures, and somebody waits for frames: why they would be too slow, for people, so that colours
+    // take their place; empty: they are not. Given the first mesh, in mm, picture or projection, and the milliseconds
+    // from frame to frame. No function: nobody waits.
+    std::function<std::string(const TexturedMesh& first, TextureAs use, double milliseconds)> pictures_too_slow = {};
     bool tells_odd_sizes = true;             // warns of frames whose size is odd; else who looks at all of them does
     bool keeps_idle_texcoords = true;        // texture coordinates for which no image is used, unless asked for
     WhileBusy while_busy = WhileBusy::wait;  // of standard input: what becomes of frames that come faster than they are

@@ -23,6 +23,7 @@ void add_render(CLI::App& app, Run& run);
 void add_serve(CLI::App& app, Run& run);
 void add_still(CLI::App& app, Run& run);
 void add_synth(CLI::App& app, Run& run);
+void add_transcode(CLI::App& app, Run& run);
 void add_verify(CLI::App& app, Run& run);
 
 }  // namespace htvm::app

@@ -20,6 +20,7 @@
 #include "io/number_text.h"
 #include "io/output_file.h"
 #include "live/client/hub_address.h"
+#include "picture_pace.h"
 #include "segment_folder.h"
 #include "stream_file.h"
 
@@ -289,7 +290,14 @@ Result<void> encode_ladder(const EncodeRequest& request) {
     }
     // By which the hub knows that they belong together.
     for (auto& work : works) work.plan.encoder.session = works.front().plan.encoder.session;
-    auto capture = Capture::open(works.front().plan.capture);
+    auto& capture_options = works.front().plan.capture;
+    if (capture_options.pictures_too_slow) {
+        std::vector<double> qualities;
+        for (const auto& work : works) qualities.push_back(work.plan.encoder.quality);
+        capture_options.pictures_too_slow =
+            pictures_too_slow({request.pictures, qualities, works.front().plan.encoder.threads, 0});
+    }
+    auto capture = Capture::open(capture_options);
     if (!capture) return tl::unexpected(capture.error());
     const auto audio = AudioTrack::open(request.audio);
     if (!audio) return tl::unexpected(audio.error());

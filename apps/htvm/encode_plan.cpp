@@ -12,6 +12,7 @@
 #include "htvm/intra_coder.hpp"
 #include "io/number_text.h"
 #include "live/client/hub_address.h"
+#include "picture_pace.h"
 #include "rate_passes.h"
 
 namespace htvm::app {
@@ -87,12 +88,6 @@ OfImages default_of_images(const EncodeRequest& request) {
         case Profile::tracked:
             break;
     }
-    if (may_not_wait(request))
-        return {colours,
-                "frames are waited for, and drawing and coding pictures takes longer than most cameras' pace allows; "
-                "--texture-as picture does it all the same"};
-    if (request.jobs > 0 || request.job.of > 0)
-        return {colours, "pictures go through the capture in one; --chunks in place of --jobs has them"};
     return {};
 }
 
@@ -126,11 +121,6 @@ std::string in_pictures(const EncodeRequest& request) {
                            "captured");
     if (request.capture.texture.files == "none")
         return refused("--texture", "none leaves no images for --texture-as " + word);
-    if (lasts && is_cut(request) && request.chunks == 1)
-        return refused("--texture-as",
-                       word +
-                           " goes through the capture in one, as each frame's is drawn over the one before; not "
-                           "with --jobs or --job, but with --chunks");
     if (has_bitrate(request) && use == TextureAs::keep)
         return refused("--texture-as",
                        "keep leaves image files as large as they are, which no --bitrate can change; captured codes "
@@ -316,6 +306,9 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     plan.audio = request.audio;
     plan.pictures = request.pictures;
     plan.encoder = encoder_of(request, plan.output);
+    if (of_images.use == TextureAs::picture && may_not_wait(request))
+        plan.capture.pictures_too_slow =
+            pictures_too_slow({request.pictures, {plan.encoder.quality}, plan.encoder.threads, request.deadline});
     if (!may_not_wait(request) && !is_paced(request) && !plan.output.may_be_live())
         plan.speed_ahead = speed_of_pictures(plan.encoder.tracked.effort);
     // A key picture takes as many bits as a second of others.

@@ -177,6 +177,19 @@ void add_to(std::string& query, const char* name, const std::string& value) {
     if (!value.empty()) query += fmt::format("{}{}={}", query.empty() ? "?" : "&", name, percent_encoded(value));
 }
 
+// Streams for browsers that do not decode the pictures of these (htvm transcode).
+void add_siblings(std::vector<live::NamedFile>& files) {
+    for (std::size_t i = files.size(); i-- > 0;)
+        for (const auto& coder : live::sibling_coders) {
+            const auto beside = [&](const fs::path& stream) {
+                return fs::path(stream).replace_extension(std::string(coder) + stream.extension().string()).string();
+            };
+            std::error_code error;
+            if (const auto path = beside(files[i].path); fs::is_regular_file(path, error))
+                files.push_back({beside(files[i].name), path});
+        }
+}
+
 Result<void> play(const PlayOptions& options) {
     if (!live::has_player())
         return fail(ErrorKind::unsupported,
@@ -209,6 +222,7 @@ Result<void> play(const PlayOptions& options) {
         add_to(query, "file", server.files[0].name);
         add_to(query, "beside", server.files[1].name);
     }
+    add_siblings(server.files);
     if (!server.files.empty()) add_to(query, "up", up_of(server.files[0].path));
     add_to(query, "orbit", options.orbit);
     auto opened = live::Server::open(server);

@@ -120,9 +120,10 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
             };
             while ((ahead = stream.next()) && is_beside(ahead->kind)) {
                 numbers.push(*ahead);
-                if (ahead->kind == PacketKind::texture && !pictures.decode(*ahead))
-                    return fail(ErrorKind::corrupt_stream,
-                                fmt::format("{}: the picture of frame {} cannot be decoded", self.name, number));
+                if (ahead->kind != PacketKind::texture) continue;
+                if (const auto shown = pictures.decode(*ahead); !shown)
+                    return fail(shown.error().kind, fmt::format("{}: the picture of frame {} cannot be decoded: {}",
+                                                                self.name, number, shown.error().message));
             }
             if (!out.mesh.texcoords.empty()) out.texture = pictures.image();
             if (out.texture && out.mesh.colours.empty())

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "command_line/terminal.h"
 #include "commands.h"
@@ -51,7 +52,7 @@ struct Verification {
     std::optional<std::size_t> lost = {};           // the newest problem that is of frames whose reference is missing
     std::optional<double> audio_end = {};           // microseconds
     std::uint64_t audio_packets = 0;
-    std::uint64_t pictures = 0;
+    std::uint64_t pictures = 0, undecoded = 0;  // undecoded: of these, as H.264 is not decoded here
     PictureDecoder shown = picture_decoder();
     std::optional<std::uint32_t> last_picture = {};  // own number of its frame
     std::optional<std::string> lost_picture = {};    // why those up to the next key picture cannot be decoded
@@ -132,7 +133,13 @@ void check_picture(Verification& v, const Packet& packet, std::uint32_t number) 
     report_bare_frames(v, number);
     if (!v.last_number || *v.last_number != number) problem("there is a picture of it, but not directly behind it");
     if (v.last_picture && packet.frame <= *v.last_picture) problem("it has a second picture");
-    v.last_picture = packet.frame;
+    const auto before = std::exchange(v.last_picture, packet.frame);
+    if (const auto read = read_texture_picture(packet); read && read->coder == PictureCoder::h264) {
+        ++v.undecoded;
+        if (!is_key_picture(packet) && before != packet.reference)
+            problem(fmt::format("the picture that it needs, of frame {}, is not there", packet.reference));
+        return;
+    }
     const bool goes_on = v.lost_picture && !is_key_picture(packet);
     const auto decoded = v.shown.decode(packet);
     if (decoded) v.lost_picture.reset();
@@ -289,10 +296,11 @@ Result<void> run_verify(const Options& options) {
         }
         if (v.problems.size() > most) fmt::print("and {} more\n", v.problems.size() - most);
         if (sound)
-            fmt::print("{}: {} in {}, all sound{}{}{}\n", options.input, counted(v.frames, "frame"),
+            fmt::print("{}: {} in {}, all sound{}{}{}{}\n", options.input, counted(v.frames, "frame"),
                        counted(v.numbers.dependencies().sequences(), "sequence"), v.index ? ", with an index" : "",
                        v.audio_packets > 0 ? ", with audio" : "",
-                       v.pictures > 0 ? ", with " + counted(v.pictures, "picture") : "");
+                       v.pictures > 0 ? ", with " + counted(v.pictures, "picture") : "",
+                       v.undecoded > 0 ? ", which are H.264 and were not decoded" : "");
     }
     if (sound) return {};
     return fail(v.refused.value_or(ErrorKind::corrupt_stream),

@@ -36,7 +36,8 @@ std::vector<Packet> any_packets(fuzz::FuzzInput& input) {
         packet.payload.assign(bytes.begin(), bytes.end());
         if (packet.kind == PacketKind::texture && input.flag()) {
             TexturePicture picture;
-            picture.coder = input.flag() ? PictureCoder::vp9 : PictureCoder::av1;
+            constexpr PictureCoder video[] = {PictureCoder::av1, PictureCoder::vp9, PictureCoder::h264};
+            picture.coder = video[input.below(3)];
             picture.width = picture.height = 16;
             picture.coded = bytes;
             if (!bytes.empty()) packet = write_texture_picture(picture, {packet.frame, packet.reference, 0, true});

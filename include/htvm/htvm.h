@@ -372,6 +372,7 @@ enum { HTVM_PACKET_AUDIO = 10, HTVM_PACKET_PICTURE = 12 };
 enum {
     HTVM_PICTURE_AV1 = 1,  /* one temporal unit of low-overhead OBUs */
     HTVM_PICTURE_VP9 = 2,  /* one frame */
+    HTVM_PICTURE_H264 = 3, /* one access unit, each NAL unit behind its size in four bytes */
     HTVM_PICTURE_PNG = 16, /* image files */
     HTVM_PICTURE_JPEG = 17,
     HTVM_PICTURE_WEBP = 18

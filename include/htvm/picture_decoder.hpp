@@ -1,4 +1,6 @@
-// Decodes the pictures of a textured stream: AV1 by dav1d, VP9 by libvpx, image files by whoever can read them.
+// Decodes the pictures of a textured stream: AV1 by dav1d, VP9 by libvpx, image files by whoever can read them. H.264,
+// which is for browsers that have neither, is refused as unsupported: the stream that it was made of has the same
+// pictures.
 //
 //   htvm::PictureDecoder pictures;
 //   for each packet of the stream, behind the mesh decoder's:

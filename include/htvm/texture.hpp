@@ -19,11 +19,12 @@ namespace htvm {
 enum class PictureCoder : std::uint8_t {
     av1 = 1,   // one temporal unit of low-overhead OBUs; key pictures begin with a sequence header OBU
     vp9 = 2,   // one frame, or a superframe that shows one
+    h264 = 3,  // one access unit: NAL units, each behind its size in four bytes; key pictures begin with parameter sets
     png = 16,  // image files as they came
     jpeg = 17,
     webp = 18,
 };
-// "AV1", "VP9", "PNG", "JPEG", "WebP".
+// "AV1", "VP9", "H.264", "PNG", "JPEG", "WebP".
 const char* name_of(PictureCoder coder);
 // Whether pictures may need those before them; image files never do.
 constexpr bool is_video(PictureCoder coder) { return static_cast<std::uint8_t>(coder) < 16; }

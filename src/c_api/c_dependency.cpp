@@ -28,6 +28,7 @@ static_assert(HTVM_PACKET_AUDIO == static_cast<int>(htvm::PacketKind::audio) &&
               HTVM_PACKET_PICTURE == static_cast<int>(htvm::PacketKind::texture));
 static_assert(HTVM_PICTURE_AV1 == static_cast<int>(htvm::PictureCoder::av1) &&
               HTVM_PICTURE_VP9 == static_cast<int>(htvm::PictureCoder::vp9) &&
+              HTVM_PICTURE_H264 == static_cast<int>(htvm::PictureCoder::h264) &&
               HTVM_PICTURE_PNG == static_cast<int>(htvm::PictureCoder::png) &&
               HTVM_PICTURE_JPEG == static_cast<int>(htvm::PictureCoder::jpeg) &&
               HTVM_PICTURE_WEBP == static_cast<int>(htvm::PictureCoder::webp));

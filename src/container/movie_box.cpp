@@ -5,6 +5,7 @@
 
 #include "codec/format/sequence.h"
 #include "container/box.h"
+#include "container/picture_configuration.h"
 
 namespace htvm {
 namespace {
@@ -55,10 +56,10 @@ void write_mesh_entry(BoxWriter& out, const Movie& movie, const MeshEntry& entry
 }
 
 void write_picture_entry(BoxWriter& out, const PictureEntry& entry) {
-    const bool av1 = entry.coder == PictureCoder::av1;
-    begin_entry(out, av1 ? four("av01") : four("vp09"));
-    write_visual(out, entry.width, entry.height, av1 ? "AV1" : "VP9");
-    out.begin(av1 ? four("av1C") : four("vpcC"));
+    const auto [type, record, name] = video_entry_of(entry.coder);
+    begin_entry(out, type);
+    write_visual(out, entry.width, entry.height, name);
+    out.begin(record);
     out.bytes(entry.configuration);
     out.end();
     out.begin(four("colr"));

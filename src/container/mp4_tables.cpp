@@ -8,6 +8,7 @@
 
 #include "container/box.h"
 #include "container/movie_box.h"
+#include "container/picture_configuration.h"
 
 namespace htvm {
 namespace {
@@ -57,7 +58,7 @@ Result<void> add(Tables& tables, OpenTrack& track, Mp4Sample sample) {
 
 std::optional<SampleTrack> kind_of(std::uint32_t sample_entry) {
     if (sample_entry == mesh_sample_entry) return SampleTrack::meshes;
-    if (sample_entry == four("av01") || sample_entry == four("vp09")) return SampleTrack::pictures;
+    if (is_picture_entry(sample_entry)) return SampleTrack::pictures;
     if (sample_entry == four("Opus")) return SampleTrack::sound;
     return std::nullopt;
 }

@@ -131,12 +131,72 @@ std::vector<std::uint8_t> vp9_configuration(const TexturePicture& key) {
     return out.take();
 }
 
+// ---- H.264: NAL units, each behind its size in four bytes -----------------------------------------------------------
+
+constexpr unsigned nal_sequence_parameters = 7, nal_picture_parameters = 8;
+
+// The record of ISO/IEC 14496-15, 5.3.3.1, of the first parameter sets.
+std::optional<std::vector<std::uint8_t>> h264_configuration(std::span<const std::uint8_t> coded) {
+    constexpr std::size_t size_bytes = 4, longest = 0xffff, shortest = 4;
+    std::span<const std::uint8_t> sequence, picture;
+    while (!coded.empty()) {
+        if (coded.size() < size_bytes) return std::nullopt;
+        const auto size =
+            std::size_t{coded[0]} << 24 | std::size_t{coded[1]} << 16 | std::size_t{coded[2]} << 8 | coded[3];
+        coded = coded.subspan(size_bytes);
+        if (size < 1 || size > coded.size()) return std::nullopt;
+        const auto unit = coded.first(size);
+        coded = coded.subspan(size);
+        const auto type = unit[0] & 31u;
+        if (type == nal_sequence_parameters && sequence.empty()) sequence = unit;
+        if (type == nal_picture_parameters && picture.empty()) picture = unit;
+    }
+    if (sequence.size() < shortest || picture.empty() || sequence.size() > longest || picture.size() > longest)
+        return std::nullopt;
+    constexpr unsigned baseline = 66, main = 77, high = 100;
+    const unsigned profile = sequence[1];
+    if (profile != baseline && profile != main && profile != high) return std::nullopt;
+    BoxWriter out;
+    out.u8(1);  // version
+    out.bytes(sequence.subspan(1, 3));
+    out.u8(0xfc | (size_bytes - 1));
+    out.u8(0xe0 | 1);
+    out.u16(static_cast<std::uint16_t>(sequence.size()));
+    out.bytes(sequence);
+    out.u8(1);
+    out.u16(static_cast<std::uint16_t>(picture.size()));
+    out.bytes(picture);
+    if (profile == high) {
+        out.u8(0xfc | 1);  // 4:2:0
+        out.u8(0xf8);      // 8 bits, of luma and of chroma
+        out.u8(0xf8);
+        out.u8(0);
+    }
+    return out.take();
+}
+
 }  // namespace
 
 std::optional<std::vector<std::uint8_t>> picture_configuration(const TexturePicture& key) {
     if (key.coder == PictureCoder::av1) return av1_configuration(key.coded);
     if (key.coder == PictureCoder::vp9) return vp9_configuration(key);
+    if (key.coder == PictureCoder::h264) return h264_configuration(key.coded);
     return std::nullopt;
+}
+
+VideoEntry video_entry_of(PictureCoder coder) {
+    switch (coder) {
+        case PictureCoder::vp9:
+            return {four("vp09"), four("vpcC"), "VP9"};
+        case PictureCoder::h264:
+            return {four("avc3"), four("avcC"), "H.264"};
+        default:
+            return {four("av01"), four("av1C"), "AV1"};
+    }
+}
+
+bool is_picture_entry(std::uint32_t sample_entry) {
+    return sample_entry == four("av01") || sample_entry == four("vp09") || sample_entry == four("avc3");
 }
 
 std::size_t delimiter_bytes(const TexturePicture& picture) {

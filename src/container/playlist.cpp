@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "container/box.h"
+#include "container/picture_configuration.h"
 
 namespace htvm {
 namespace {
@@ -250,7 +251,7 @@ std::string two_digits(unsigned value) {
 
 constexpr std::size_t visual_fields = 78;  // of a sample entry of pictures, before its boxes
 
-// As "av01.0.08M.08" or "vp09.00.31.08", by the record of its configuration.
+// As "av01.0.08M.08", "vp09.00.31.08" or "avc3.64001f", by the record of its configuration.
 std::string codec_of(const MediaBox& entry) {
     if (entry.type == four("Opus")) return "opus";
     if (entry.type == four("htvm")) return "htvm";
@@ -266,6 +267,12 @@ std::string codec_of(const MediaBox& entry) {
     if (const auto record = find_box(inside, four("vpcC")); record && record->inside.size() >= 7)
         return "vp09." + two_digits(record->inside[4] % 100) + "." + two_digits(record->inside[5] % 100) + "." +
                two_digits(record->inside[6] >> 4);
+    if (const auto record = find_box(inside, four("avcC")); record && record->inside.size() >= 4) {
+        std::string out = "avc3.";
+        for (const auto byte : record->inside.subspan(1, 3))
+            for (const auto digit : {byte >> 4, byte & 15}) out += "0123456789abcdef"[digit];
+        return out;
+    }
     return {};
 }
 
@@ -300,8 +307,7 @@ std::string codecs_of(std::span<const std::uint8_t> map) {
 PictureSize picture_size_of(std::span<const std::uint8_t> map) {
     constexpr std::size_t width_at = 24, height_at = 26;
     for (const auto& entry : entries_of(map)) {
-        const bool pictures = entry.type == four("av01") || entry.type == four("vp09");
-        if (!pictures || entry.inside.size() < visual_fields) continue;
+        if (!is_picture_entry(entry.type) || entry.inside.size() < visual_fields) continue;
         const auto number_at = [&](std::size_t at) {
             return static_cast<std::uint32_t>(entry.inside[at] << 8 | entry.inside[at + 1]);
         };

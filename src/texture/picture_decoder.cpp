@@ -273,6 +273,10 @@ Result<void> PictureDecoder::decode(const Packet& packet) {
     if (!read) return tl::unexpected(read.error());
     if (read->width > its.options.largest_side || read->height > its.options.largest_side)
         return fail(ErrorKind::limit, "picture: it is larger than allowed");
+    if (read->coder == PictureCoder::h264)
+        return fail(ErrorKind::unsupported,
+                    "picture: H.264 is for browsers, and is not decoded here; the stream that it was made of has the "
+                    "same pictures as AV1 or VP9");
     auto taken = is_video(read->coder) ? its.show_video(*read, packet) : its.show_file(*read);
     if (!taken) return taken;
     its.picture = *read;

@@ -33,7 +33,7 @@ tl::unexpected<Error> refused(const std::string& what) { return fail(ErrorKind::
 Result<void> check(const PictureEncoderOptions& options) {
     if (options.coder != PictureCoder::av1 && options.coder != PictureCoder::vp9)
         return fail(ErrorKind::unsupported,
-                    std::string("pictures: ") + name_of(options.coder) + " is no coder of video");
+                    std::string("pictures: ") + name_of(options.coder) + " is not coded here, but AV1 and VP9");
     for (const auto side : {options.width, options.height})
         if (side < smallest_side || side > most_picture_side)
             return refused("a side is " + std::to_string(side) + " pixels; " + std::to_string(smallest_side) + " to " +

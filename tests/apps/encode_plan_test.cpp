@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "core/thread.h"
+#include "picture_pace.h"
 #include "rate_passes.h"
 
 namespace htvm::app {
@@ -84,8 +85,8 @@ TEST(Contradictions, SettingsOfVideoNeedPicturesThatAreCodedAsVideo) {
         "captured";
     auto request = usual();
     request.pictures.size = 512;
-    EXPECT_EQ(contradiction_in(request), "");  // pictures are what images become
-    request.jobs = 2;
+    EXPECT_EQ(contradiction_in(request), "");      // pictures are what images become
+    request.encoding.profile = Profile::topology;  // colours are
     EXPECT_EQ(contradiction_in(request), "--texture-size" + advice);
     request = with_pictures(TextureAs::colours, Profile::tracked);
     request.pictures.size = 512;
@@ -111,21 +112,6 @@ TEST(Contradictions, PicturesGoWithTheMeshesThatTheyLieOn) {
     auto request = with_pictures(TextureAs::picture, Profile::tracked);
     request.capture.texture.files = "none";
     EXPECT_EQ(contradiction_in(request), "--texture: none leaves no images for --texture-as picture");
-}
-
-TEST(Contradictions, PicturesAreDrawnOneOverTheOther) {
-    const std::string why =
-        "--texture-as: picture goes through the capture in one, as each frame's is drawn over the one before; not with "
-        "--jobs or --job, but with --chunks";
-    auto request = with_pictures(TextureAs::picture, Profile::tracked);
-    request.jobs = 2;
-    EXPECT_EQ(contradiction_in(request), why);
-    request.jobs = 0;
-    request.job = {1, 2};
-    EXPECT_EQ(contradiction_in(request), why);
-    request.job = {};
-    request.chunks = 2;
-    EXPECT_EQ(contradiction_in(request), "");
 }
 
 TEST(Contradictions, ABitrateIsOfThePicturesToo) {
@@ -417,26 +403,53 @@ TEST(EncodePlan, ImagesBecomePicturesByDefault) {
     EXPECT_EQ(plan(request).capture.texture_as, TextureAs::by_default);  // until there is an image
 }
 
-TEST(EncodePlan, ImagesBecomeColoursWherePicturesCannotBeAndItIsSaidWhy) {
-    const auto why = [](const EncodeRequest& request) {
-        const auto made = plan(request);
-        EXPECT_EQ(made.capture.of_images, TextureAs::colours);
-        return made.capture.why_no_pictures.substr(0, 23);
-    };
-    auto request = to_hub();
-    EXPECT_EQ(why(request), "frames are waited for, ");
-    request = piped();
-    request.deadline = 50;
-    EXPECT_EQ(why(request), "frames are waited for, ");
-    request = usual();
+TEST(EncodePlan, ImagesBecomePicturesInJobsToo) {
+    auto request = usual();
     request.jobs = 2;
-    EXPECT_EQ(why(request), "pictures go through the");
+    EXPECT_EQ(plan(request).capture.of_images, TextureAs::picture);
     request.jobs = 0;
     request.job = {1, 2};
-    EXPECT_EQ(why(request), "pictures go through the");
-    request = usual();
+    EXPECT_EQ(plan(request).capture.of_images, TextureAs::picture);
+    EXPECT_FALSE(plan(request).capture.pictures_too_slow) << "nobody waits";
+}
+
+TEST(EncodePlan, ImagesBecomePicturesWhereFramesAreWaitedForIfTheseAreFastEnough) {
+    auto request = to_hub();
+    EXPECT_EQ(plan(request).capture.of_images, TextureAs::picture);
+    EXPECT_TRUE(plan(request).capture.pictures_too_slow);
+    request = piped();
+    EXPECT_FALSE(plan(request).capture.pictures_too_slow);
+    request.deadline = 50;
+    EXPECT_TRUE(plan(request).capture.pictures_too_slow);
+}
+
+TEST(PicturePace, PicturesMayTakeHalfOfAFrame) {
+    EXPECT_EQ(too_slow(20, 40), "");
+    EXPECT_EQ(too_slow(20.4, 40),
+              "drawing and coding a picture took 20 ms when it was tried, and frames that come every 40 ms leave 20 ms "
+              "for it; --texture-as picture sends pictures all the same");
+}
+
+TEST(PicturePace, IsTriedWithTheFirstMeshAndAllQualitiesAndNotWithoutAnImage) {
+    TexturedMesh square;
+    square.mesh.positions = {{0, 0, 0}, {1000, 0, 0}, {1000, 1000, 0}, {0, 1000, 0}};
+    square.mesh.texcoords = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    square.mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    const auto slow = pictures_too_slow({{}, {42}, 1, 0});
+    EXPECT_EQ(slow(square, TextureAs::picture, 1e-6), "") << "there is no image";
+    square.texture = std::make_shared<const Image>(Image{64, 64, std::vector<std::uint8_t>(3 * 64 * 64, 100)});
+    EXPECT_EQ(slow(square, TextureAs::picture, 1e9), "");
+    EXPECT_NE(slow(square, TextureAs::picture, 1e-6), "");
+    EXPECT_NE(slow(square, TextureAs::projection, 1e-6), "");
+    EXPECT_NE(pictures_too_slow({{}, {42}, 1, 1e-6})(square, TextureAs::picture, 1e9), "") << "the deadline";
+    EXPECT_EQ(pictures_too_slow({{}, {}, 1, 0})(square, TextureAs::picture, 1e-6), "") << "of no rung";
+}
+
+TEST(EncodePlan, ImagesBecomeColoursInOtherProfilesAndItIsSaidWhy) {
+    auto request = usual();
     request.encoding.profile = Profile::paper;
-    EXPECT_EQ(why(request), "--texture-as captured s");
+    EXPECT_EQ(plan(request).capture.of_images, TextureAs::colours);
+    EXPECT_EQ(plan(request).capture.why_no_pictures.substr(0, 23), "--texture-as captured s");
 }
 
 TEST(EncodePlan, APresetIsAPlaceOnTheOneScaleOfQuality) {

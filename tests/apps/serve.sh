@@ -64,6 +64,13 @@ printf 'files = "none"\n' >files.conf
 expect 1 "none" "$htvm" serve --port 0 --config files.conf
 start --config files.conf --files streams # the command line counts
 stop INT
+# A sibling is read, and not listed; what is called like one and has no stream beside it is a stream.
+mkdir siblings
+for name in person person.h264 anna.vp9; do echo "$name" >siblings/$name.htvm; done
+start --files siblings
+[ "$(ask "$url/files/person.h264.htvm")" = "200 person.h264" ] || fail "a sibling is not read: $(ask "$url/files/person.h264.htvm")"
+[ "$(ask "$url/api/files" | grep -o '"[a-z0-9.]*htvm"' | sort -u | paste -sd ' ')" = '"anna.vp9.htvm" "person.htvm"' ] || fail "listed: $(ask "$url/api/files")"
+stop TERM
 mkdir recordings
 start --record recordings --record-minutes 60
 [ "$(ask "$url/readyz")" = "200 ready" ] || fail "is not ready: $(ask "$url/readyz")"

@@ -169,7 +169,6 @@ expect 5 "of the meshes, which share --bitrate with the pictures, so give more" 
 no() { expect 2 "$1" "$htvm" encode walk -o never.htvm "${@:2}"; }
 no "add --profile topology" --texture-as captured
 no "with other profiles give captured" --profile topology --texture-as picture
-no "goes through the capture in one" --texture-as picture --jobs 2
 no "add --texture-as picture, projection or captured" --texture-as colours --texture-size 64
 no "keep leaves image files as large as they are" --profile topology --texture-as keep --bitrate 2
 no "follows from --bitrate" --profile topology --texture-as captured --bitrate 2 --texture-quality 5

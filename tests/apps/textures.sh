@@ -39,17 +39,19 @@ expect 0 "the texture coordinates are encoded, their image (capture/frame_00000.
 [ "$(unlit capture coordinates.htvm)" -gt "$textured" ] || fail "kept coordinates do not show the image"
 [ "$(unlit capture pictures.htvm)" -ge "$textured" ] || fail "pictures are worse than colours"
 
-# Two processes give the same stream, of colours, which is said.
-expect 0 "without its details: pictures go through the capture in one; --chunks in place of --jobs has them" \
-    "$htvm" encode capture --keyint 1 --jobs 2 -o jobs.htvm
+# Two processes give the same stream, of pictures.
+expect 0 "3 pictures" "$htvm" encode capture --keyint 1 --jobs 2 -o jobs.htvm
 "$htvm" encode capture --keyint 1 --jobs 1 -o job.htvm --quiet
 cmp -s jobs.htvm job.htvm || fail "jobs make another stream"
 
 # Standard input: an image by its comment, and one for all.
 (cd capture && cat frame_0000*.ply | "$htvm" encode - -o ../piped.htvm --quiet)
 expect 0 "3 pictures" "$htvm" info piped.htvm
-expect 0 "without its details: frames are waited for" \
-    bash -c "cd capture && cat frame_0000*.ply | '$htvm' encode - --deadline 1000 -o ../timed.htvm"
+# Where frames are waited for there are pictures if there is time for them, and else a line says why not.
+expect 0 "are 3 pictures" \
+    bash -c "cd capture && cat frame_0000*.ply | '$htvm' encode - --fps 0.1 --deadline 60000 -o ../timed.htvm"
+expect 0 "without its details: drawing and coding a picture took" \
+    bash -c "cd capture && cat frame_0000*.ply | '$htvm' encode - --deadline 1 -o ../timed.htvm"
 "$htvm" decode timed.htvm -o timed/ --quiet
 head -c 400 timed/00000.ply | grep -qa "property uchar red" || fail "meshes that are waited for have no colours"
 expect 1 "take one image for all" bash -c "cat capture/*.ply | '$htvm' encode - --texture 'capture/frame_%05d.jpg' -o x.htvm"

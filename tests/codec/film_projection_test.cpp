@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -96,6 +97,71 @@ TEST(FilmedFrames, HaveThePlacesOfTheirDecodedPositionsInTheFilm) {
                 }
             }
         }
+}
+
+// A ball whose horn is on the side from frame 2 on: the region where it was is small enough to be patched.
+TestSequence patched_ball() { return horned_ball(6, 2, 80, 0.03); }
+
+std::size_t patch_in(const CodedSequence& coded) {
+    const auto is_patch = [](const FrameInfo& info) { return info.type == FrameType::patched; };
+    EXPECT_EQ(std::count_if(coded.infos.begin(), coded.infos.end(), is_patch), 1);
+    return static_cast<std::size_t>(std::find_if(coded.infos.begin(), coded.infos.end(), is_patch) -
+                                    coded.infos.begin());
+}
+
+TEST(FilmedFrames, ThatArePatchedHaveTheirPlacesInTheFilmAsWell) {
+    for (const int group : {1, 3})
+        for (const double step : {0.0, 20.0}) {
+            SCOPED_TRACE(testing::Message() << "groups of " << group << ", the camera moves " << step << " mm");
+            auto options = filmed_options();
+            options.tracked.group = group;
+            const auto coded = encode(filmed(patched_ball(), step), options);
+            ASSERT_TRUE(coded.errors.empty()) << coded.errors[0];
+            const auto patch = patch_in(coded);
+            ASSERT_TRUE(patch > 0 && patch < 5) << patch;
+            const auto frames = decoded_frames(coded.packets);
+            ASSERT_EQ(frames.size(), 6u);
+            EXPECT_NE(frames[patch].reference_topology, frames[patch - 1].reference_topology);
+            EXPECT_EQ(frames[patch + 1].reference_topology, frames[patch].reference_topology);
+            FilmCamera camera;
+            for (std::size_t i = 0; i < frames.size(); ++i, camera.right += step) {
+                const auto& mesh = frames[i].mesh;
+                EXPECT_EQ(mesh.positions, coded.reconstructions[i].positions);
+                if (frames[i].presence.empty()) {
+                    EXPECT_EQ(mesh.triangles, coded.reconstructions[i].triangles);
+                }
+                EXPECT_EQ(mesh.texcoords, coded.reconstructions[i].texcoords);
+                ASSERT_EQ(mesh.texcoords.size(), mesh.positions.size());
+                for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+                    const auto& p = mesh.positions[v];
+                    const auto [x, y] =
+                        camera.place(static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2]));
+                    constexpr double pixel_share = 0.02;
+                    ASSERT_NEAR(static_cast<double>(mesh.texcoords[v][0]), x, pixel_share / 512);
+                    ASSERT_NEAR(static_cast<double>(mesh.texcoords[v][1]), y, pixel_share / 256);
+                }
+            }
+        }
+}
+
+// Who starts at the patch needs the meshes that it is made of, and not the frames between, nor their projections.
+TEST(FilmedFrames, ThatArePatchedDecodeWithoutTheFramesBetween) {
+    auto options = filmed_options();
+    options.tracked.references = TrackedReferences::intra;
+    const auto coded = encode(filmed(patched_ball(), 20), options);
+    ASSERT_TRUE(coded.errors.empty()) << coded.errors[0];
+    const auto patch = patch_in(coded);
+    ASSERT_TRUE(patch > 1 && patch < 5) << patch;
+    ASSERT_EQ(coded.infos[patch].reference, 0u);
+    std::vector<Packet> needed;
+    for (const auto& packet : coded.packets)
+        if (!frame_type(packet.kind) || packet.frame == 0 || packet.frame >= patch) needed.push_back(packet);
+    const auto all = decoded_frames(coded.packets), some = decoded_frames(needed);
+    ASSERT_EQ(some.size(), 7 - patch);
+    for (std::size_t i = patch; i < 6; ++i) {
+        EXPECT_EQ(some[i - patch + 1].mesh.positions, all[i].mesh.positions);
+        EXPECT_EQ(some[i - patch + 1].mesh.texcoords, all[i].mesh.texcoords);
+    }
 }
 
 TEST(FilmedFrames, OfOneReferenceHaveOneTopologyAndPlacesOfTheirOwn) {

@@ -37,9 +37,16 @@ inline Packet header_packet(const char* title = "Anna") {
 
 // A temporal unit of AV1 in the shape of one: a delimiter, for key pictures a sequence header of level 8, and a frame.
 inline Packet picture_packet(std::uint32_t frame, std::uint32_t reference, PictureCoder coder = PictureCoder::av1) {
-    Bytes coded = {0x12, 0x00};
-    if (frame == reference) coded.insert(coded.end(), {0x0a, 2, 0x0a, 0});
-    coded.insert(coded.end(), {0x32, 2, 0x10, static_cast<std::uint8_t>(frame)});
+    Bytes coded;
+    if (coder == PictureCoder::h264) {
+        // An access unit: for key pictures the parameter sets of profile 100, level 31, and a slice.
+        if (frame == reference) coded = {0, 0, 0, 5, 0x67, 100, 0, 31, 9, 0, 0, 0, 2, 0x68, 5};
+        coded.insert(coded.end(), {0, 0, 0, 2, 0x65, static_cast<std::uint8_t>(frame)});
+    } else {
+        coded = {0x12, 0x00};
+        if (frame == reference) coded.insert(coded.end(), {0x0a, 2, 0x0a, 0});
+        coded.insert(coded.end(), {0x32, 2, 0x10, static_cast<std::uint8_t>(frame)});
+    }
     TexturePicture picture;
     picture.coder = coder;
     if (!is_video(coder)) picture.matrix = ColourMatrix::none;

@@ -115,7 +115,9 @@ std::span<const std::uint8_t> inside(std::span<const std::uint8_t> bytes, std::i
         const auto box = find_box(bytes, type);
         EXPECT_TRUE(box) << std::hex << type;
         if (!box) return {};
-        const auto fields = type == four("stsd") ? 8u : type == four("av01") || type == four("htvm") ? 78u : 0u;
+        const auto fields = type == four("stsd")                                                   ? 8u
+                            : type == four("av01") || type == four("avc3") || type == four("htvm") ? 78u
+                                                                                                   : 0u;
         bytes = box->inside.subspan(fields);
     }
     return bytes;
@@ -138,6 +140,50 @@ TEST(Mp4, says_what_the_pictures_are_in_a_record_of_their_first_key_picture) {
         found[meshes].inside, {four("mdia"), four("minf"), four("stbl"), four("stsd"), four("htvm"), four("htvC")});
     const auto header = write_packet(stream[0]);
     EXPECT_EQ(Bytes(configuration.begin() + 8, configuration.end()), header);
+}
+
+// The stream of six frames whose pictures are H.264, a key picture at the first.
+std::vector<Packet> h264_stream() {
+    std::vector<Packet> out = {header_packet()};
+    for (std::uint32_t frame = 0; frame < 6; ++frame) {
+        using namespace packet_flag;
+        const auto kind = frame == 0 ? PacketKind::intra : PacketKind::tracked;
+        out.push_back(frame_packet(kind, frame, 0, static_cast<std::uint8_t>(frame == 0 ? referred | access : 0)));
+        out.push_back(picture_packet(frame, frame == 0 ? 0 : frame - 1, PictureCoder::h264));
+    }
+    return out;
+}
+
+TEST(Mp4, has_h264_in_an_entry_whose_record_has_its_parameter_sets) {
+    const auto stream = h264_stream();
+    const auto mp4 = mp4_of(stream);
+    const auto tracks = tables_of(*mp4);
+    ASSERT_EQ(tracks.size(), 2u);
+    EXPECT_EQ(tracks[pictures].kind, SampleTrack::pictures);
+    EXPECT_EQ(tracks[pictures].samples.size(), 6u);
+    const auto moov = inside(*mp4, {four("moov")});
+    BoxReader boxes(moov);
+    std::vector<MediaBox> found;
+    while (const auto box = boxes.next())
+        if (box->type == four("trak")) found.push_back(*box);
+    const auto record = inside(found[pictures].inside,
+                               {four("mdia"), four("minf"), four("stbl"), four("stsd"), four("avc3"), four("avcC")});
+    EXPECT_EQ(Bytes(record.begin(), record.end()),
+              (Bytes{1, 100, 0, 31, 0xff, 0xe1, 0, 5, 0x67, 100, 0, 31, 9, 1, 0, 2, 0x68, 5, 0xfd, 0xf8, 0xf8, 0}));
+    EXPECT_EQ(unpacked(*mp4)->bytes, bytes_of(stream));
+}
+
+TEST(Mp4, keeps_h264_whole_whose_parameter_sets_are_missing_or_of_a_profile_that_streams_have_not) {
+    for (const std::size_t place : {std::size_t{5}, std::size_t{3}, std::size_t{4}, std::size_t{13}}) {
+        auto stream = h264_stream();
+        auto& payload = stream[2].payload;
+        const auto coded = payload.size() - 21;
+        ASSERT_EQ(payload[coded + 4], 0x67);
+        payload[coded + place] = 110;  // the profile; a size beyond the end; another kind of unit, of both sets
+        const auto mp4 = mp4_of(stream);
+        EXPECT_EQ(tables_of(*mp4).size(), 1u) << place;
+        EXPECT_EQ(unpacked(*mp4)->bytes, bytes_of(stream));
+    }
 }
 
 TEST(Mp4, says_which_samples_an_access_point_needs) {

@@ -13,7 +13,7 @@ fail() { echo "FAILED: $*"; exit 1; }
 
 # ---- man pages --------------------------------------------------------------------------------------------------------
 
-[ "$(cd man1 && echo *)" = "htvm-calibrate.1 htvm-check.1 htvm-compare.1 htvm-cut.1 htvm-decode.1 htvm-demo.1 htvm-encode.1 htvm-help.1 htvm-index.1 htvm-info.1 htvm-join.1 htvm-lab-bake.1 htvm-lab-decoding.1 htvm-lab-endure.1 htvm-lab-events.1 htvm-lab-help.1 htvm-lab-hierarchy.1 htvm-lab-rd.1 htvm-lab-reproduce.1 htvm-lab.1 htvm-link.1 htvm-pack.1 htvm-play.1 htvm-publish.1 htvm-render.1 htvm-serve.1 htvm-still.1 htvm-synth.1 htvm-verify.1 htvm.1" ] ||
+[ "$(cd man1 && echo *)" = "htvm-calibrate.1 htvm-check.1 htvm-compare.1 htvm-cut.1 htvm-decode.1 htvm-demo.1 htvm-encode.1 htvm-help.1 htvm-index.1 htvm-info.1 htvm-join.1 htvm-lab-bake.1 htvm-lab-decoding.1 htvm-lab-endure.1 htvm-lab-events.1 htvm-lab-help.1 htvm-lab-hierarchy.1 htvm-lab-rd.1 htvm-lab-reproduce.1 htvm-lab.1 htvm-link.1 htvm-pack.1 htvm-play.1 htvm-publish.1 htvm-render.1 htvm-serve.1 htvm-still.1 htvm-synth.1 htvm-transcode.1 htvm-verify.1 htvm.1" ] ||
     fail "the pages are $(cd man1 && echo *)"
 for page in man1/*.1; do
     for section in NAME SYNOPSIS DESCRIPTION OPTIONS '"EXIT STATUS"' '"SEE ALSO"'; do
@@ -64,7 +64,7 @@ offers() {
     [ "$offered" = "$1" ] || fail "bash offers '$offered' for '$2', not '$1'"
     checks=$((checks + 1))
 }
-offers 'calibrate|check|compare|cut|decode|demo|encode|help|index|info|join|link|pack|play|publish|render|serve|still|synth|verify' 'htvm '
+offers 'calibrate|check|compare|cut|decode|demo|encode|help|index|info|join|link|pack|play|publish|render|serve|still|synth|transcode|verify' 'htvm '
 offers 'decode' 'htvm dec'
 offers '--help|--version' 'htvm --'
 offers 'paper|topology|tracked' 'htvm encode capture --profile '

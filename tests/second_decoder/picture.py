@@ -1,4 +1,4 @@
-"""Chapter 14 of docs/bitstream.md: packets of texture pictures. What AV1, VP9 and the coders of images code is not
+"""Chapter 14 of docs/bitstream.md: packets of texture pictures. What AV1, VP9, H.264 and the coders of images code is not
 decoded.
 
   picture.py STREAM.htvm    prints the pictures as tests/data/conformance/pictures_6.pictures has them, but for the digest of
@@ -9,7 +9,7 @@ import zlib
 
 from conventions import Bytes, check
 
-VIDEO, IMAGES = (1, 2), (16, 17, 18)
+VIDEO, IMAGES = (1, 2, 3), (16, 17, 18)
 MATRICES = (1, 6)
 
 

@@ -132,7 +132,7 @@ test('packets whose rest is nowhere are not sought among all samples again and a
     let looked = 0;
     const counted = (values) => new Proxy(values, { get: (of, key) => (typeof key === 'string' && /^\d/.test(key) && ++looked, Reflect.get(of, key)) });
     const packet = movies[0].indexOf('HTVP');
-    const part = Buffer.concat([Buffer.from('HTVX'), Buffer.from([1, 0, 0, 1]), movies[0].subarray(packet, packet + 32), Buffer.alloc(8)]);
+    const part = Buffer.concat([Buffer.from('HTVX'), Buffer.from([1, 0, 1, 0]), movies[0].subarray(packet, packet + 32), Buffer.alloc(8)]);
     const sample = new Uint8Array(Buffer.concat(Array(8000).fill(part)));
     const column = (value, count) => new Array(count).fill(value);
     const track = (kind, sizes) => ({

@@ -1,14 +1,14 @@
 // Texture pictures: what is read of a packet, how they are decoded, and in Chromium, that each frame is shown with its own picture.
 // HTVM names the program that makes the meshes.
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
+import { execFileSync, spawnSync } from 'node:child_process';
 import { mkdir, mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
-import { codecString, isAccess, isFrame, isKeyPicture, packetKind, readPicture } from '../packages/decoder/dist/node.js';
+import { codecDescription, codecString, isAccess, isFrame, isKeyPicture, packetKind, readPicture } from '../packages/decoder/dist/node.js';
 import { launch } from './browser.mjs';
 import { LiveHub, Publishing } from './live_hub.mjs';
 import { TestServer } from './server.mjs';
@@ -41,7 +41,7 @@ test('a picture is read, and what is malformed is not', () => {
     const payload = picturePayload(whole);
     for (let size = 0; size < payload.length - 2; ++size)
         assert.equal(readPicture({ kind: 12, bytes: packet(12, payload.slice(0, size)) }), null, `${size} bytes`);
-    for (const wrong of [{ coder: 3 }, { matrix: 2 }, { width: 0 }, { height: 4097 }, { width: 128 * 128 }])
+    for (const wrong of [{ coder: 4 }, { matrix: 2 }, { width: 0 }, { height: 4097 }, { width: 128 * 128 }])
         assert.equal(readPicture(picturePacket({ ...whole, ...wrong }, {})), null, JSON.stringify(wrong));
 });
 
@@ -69,6 +69,24 @@ test('the names that browsers have for codecs are told from key pictures', () =>
     assert.equal(name('VP9', [0x82], 128, 128), 'vp09.00.10.08');
     assert.equal(name('VP9', [0x92]), null);
     assert.equal(name('VP9', [0x00]), null);
+});
+
+test('the name and the description of H.264 are told from the parameter sets of key pictures', () => {
+    const unit = (...bytes) => [0, 0, 0, bytes.length, ...bytes];
+    const told = (...units) => {
+        const coded = Uint8Array.from(units.flat());
+        const description = codecDescription({ coder: 'H.264', coded });
+        return [codecString({ coder: 'H.264', coded, width: 64, height: 64 }), description && [...description]];
+    };
+    const [sequence, picture, slice] = [unit(0x67, 77, 0x40, 0x1f, 9), unit(0x68, 5), unit(0x65, 1, 2, 3)];
+    const record = [1, 77, 0x40, 0x1f, 0xff, 0xe1, 0, 5, 0x67, 77, 0x40, 0x1f, 9, 1, 0, 2, 0x68, 5];
+    assert.deepEqual(told(sequence, picture, slice), ['avc1.4d401f', record]);
+    const [name, high] = told(unit(0x67, 100, 0, 0x28), picture, slice);
+    assert.deepEqual([name, high.slice(-4)], ['avc1.640028', [0xfd, 0xf8, 0xf8, 0]]);
+    for (const wrong of [[slice], [sequence, slice], [unit(0x67, 110, 0, 0x28), picture], [unit(0x67, 77), picture], [sequence, picture, [0, 0]],
+        [sequence, picture, [0, 0, 0, 9, 1]], [sequence, picture, [255, 255, 255, 255, 1]], [[0, 0, 0, 0], sequence, picture], []])
+        assert.deepEqual(told(...wrong), [null, null], JSON.stringify(wrong));
+    assert.equal(codecDescription({ coder: 'VP9', coded: Uint8Array.of(0x82) }), null);
 });
 
 // ---- decoding, with decoders that do what the test says ------------------------------------------------------------------
@@ -135,7 +153,7 @@ const image = (timestamp) => {
     return made;
 };
 
-function begin({ needed = () => true, fast = true } = {}) {
+function begin({ needed = () => true, fast = true, lacks = async () => false } = {}) {
     globalThis.VideoDecoder = FakeDecoder;
     globalThis.EncodedVideoChunk = class {
         constructor(init) {
@@ -146,7 +164,7 @@ function begin({ needed = () => true, fast = true } = {}) {
     open = new Set();
     const notices = [];
     const settled = [];
-    const pictures = new Pictures({ settled: (id) => settled.push(id), isNeeded: needed, notice: (text) => notices.push(text) });
+    const pictures = new Pictures({ settled: (id) => settled.push(id), isNeeded: needed, lacks, notice: (text) => notices.push(text) });
     const take = (frame, key = false, more = {}) =>
         pictures.add({
             type: 'picture', coder: 'VP9', matrix: 'bt709', fullRange: false, width: 128, height: 128, gains: [1, 1, 1], frame,
@@ -275,6 +293,19 @@ test('without a decoder for them pictures are left out, and words say why', asyn
     delete globalThis.VideoDecoder;
     assert.equal(other.pictures.state(other.take(1, true)), 'gone');
     assert.match(other.notices[0], /WebCodecs/);
+});
+
+test('where pictures come from elsewhere nothing is said, and another stream asks anew', async () => {
+    const asked = [];
+    const { pictures, take, notices } = begin({ lacks: async (coder) => asked.push(coder) === 1 });
+    FakeDecoder.supported = false;
+    const first = take(1, true);
+    await turn();
+    assert.deepEqual([pictures.state(first), notices, asked], ['coming', [], ['VP9']]);
+    pictures.close();
+    const second = take(1, true);
+    await turn();
+    assert.deepEqual([pictures.state(second), notices.length, asked], ['gone', 1, ['VP9', 'VP9']]);
 });
 
 // ---- in Chromium --------------------------------------------------------------------------------------------------------
@@ -465,6 +496,39 @@ inPage('a frame without a picture shows the last one; gains raise what is decode
     }
 });
 
+inPage('from afar a pixel is the mean of its texels, and not of what lies beyond the gutter of a chart', async (page) => {
+    // Lines of one texel, and eight texels of grey between them and green: as two charts lie.
+    const bytes = await page.evaluate(async () => {
+        const canvas = new OffscreenCanvas(256, 256);
+        const context = canvas.getContext('2d');
+        const fill = (colour, from, width) => {
+            context.fillStyle = colour;
+            context.fillRect(from, 0, width, 256);
+        };
+        for (let x = 0; x < 124; ++x) fill(x % 2 === 0 ? 'black' : 'white', x, 1);
+        fill('rgb(128,128,128)', 124, 8);
+        fill('rgb(0,255,0)', 132, 124);
+        return [...new Uint8Array(await (await canvas.convertToBlob({ type: 'image/png' })).arrayBuffer())];
+    });
+    server.made.set('lines.htvm', withPictures('PNG', pictures.PNG.map(() => ({ key: true, bytes })), { width: 256, height: 256 }));
+    await openPlayer(page, 'lines');
+    const drawn = await page.evaluate(async () => {
+        Object.assign(test.player.style, { width: '64px', height: '64px' });
+        await new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve))); // until its size is observed
+        await test.player.idle();
+        const bitmap = await createImageBitmap(await test.player.screenshot());
+        const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+        context.drawImage(bitmap, 0, 0);
+        const middle = [...context.getImageData(0, bitmap.height / 2, bitmap.width, 1).data];
+        return Array.from({ length: bitmap.width }, (_, x) => middle.slice(4 * x, 4 * x + 4)).filter(([, , , alpha]) => alpha === 255).map((rgba) => rgba.slice(0, 3));
+    });
+    const texels = 256 / drawn.length; // of a pixel
+    assert.ok(texels > 4 && texels < 8, `${drawn.length} pixels`);
+    const half = Math.floor(drawn.length / 2);
+    for (const [x, rgb] of drawn.slice(1, half - 1).entries()) for (const value of rgb) assert.ok(Math.abs(value - 128) < 40, `pixel ${x + 1}: ${rgb}`);
+    for (const [x, rgb] of drawn.slice(half + 2, -1).entries()) assert.deepEqual(rgb, [0, 255, 0], `pixel ${half + 2 + x}`);
+});
+
 inPage('pictures of frames that a seek leaves out are decoded for those that need them', async (page) => {
     server.made.set('own.htvm', withPictures('AV1', pictures.own, { of: ownMeshes }));
     const frame = frames - 2;
@@ -493,14 +557,20 @@ inPage('a browser without WebCodecs shows the meshes, and says why without pictu
     assert.equal(await last(page), frames - 1);
 }, 'delete globalThis.VideoDecoder');
 
-for (const codec of ['av1', 'vp9'])
+const noFfmpeg = spawnSync('ffmpeg', ['-version']).error !== undefined;
+
+for (const codec of noFfmpeg ? ['av1', 'vp9'] : ['av1', 'vp9', 'h264'])
     inPage(`a capture with images, encoded with ${codec}, is shown with them, wherever playing starts`, async (page) => {
         const capture = join(work, 'capture');
         for (const [frame, { bytes }] of pictures.PNG.entries())
             await writeFile(join(capture, `${String(frame).padStart(3, '0')}.png`), Uint8Array.from(bytes));
         const stream = join(work, `${codec}.htvm`);
-        const words = ['--fps', '30', '--profile', 'topology', '--keyint', '10', '--texture-as', 'captured', '--texture-codec', codec, '--texture-quality', '80'];
+        const words = ['--fps', '30', '--profile', 'topology', '--keyint', '10', '--texture-as', 'captured', '--texture-codec', codec === 'h264' ? 'av1' : codec, '--texture-quality', '80'];
         execFileSync(program, ['encode', capture, ...words, '-o', stream], { stdio: 'pipe' });
+        if (codec === 'h264') {
+            const as = ['--texture-codec', codec, '--texture-quality', '80'];
+            execFileSync(program, ['transcode', join(work, 'av1.htvm'), ...as, '-o', stream], { stdio: 'pipe' });
+        }
         const bytes = await readFile(stream);
         // There are places to start that have no key picture.
         const keys = packetsOf(bytes).filter(isKeyPicture).map(({ frame }) => frame);

@@ -15,7 +15,7 @@ tl::unexpected<Error> corrupt(const char* what) {
 
 bool is_known(PictureCoder coder) {
     using enum PictureCoder;
-    return coder == av1 || coder == vp9 || coder == png || coder == jpeg || coder == webp;
+    return coder == av1 || coder == vp9 || coder == h264 || coder == png || coder == jpeg || coder == webp;
 }
 
 }  // namespace
@@ -26,6 +26,8 @@ const char* name_of(PictureCoder coder) {
             return "AV1";
         case PictureCoder::vp9:
             return "VP9";
+        case PictureCoder::h264:
+            return "H.264";
         case PictureCoder::png:
             return "PNG";
         case PictureCoder::jpeg:

@@ -119,18 +119,34 @@ Result<ServedFile> ServedFiles::file(std::span<const std::string> segments) cons
     return folder_ && watched ? folder_->file(segments) : fail(ErrorKind::bad_input, "not served");
 }
 
+namespace {
+
+// Whether it is the sibling of another one of these: person.h264.htvm of person.htvm.
+bool is_sibling(std::string_view path, const std::set<std::string_view>& streams) {
+    for (const auto coder : sibling_coders) {
+        const auto ending = "." + std::string(coder) + std::string(stream_ending);
+        if (!path.ends_with(ending)) continue;
+        const auto other = std::string(path.substr(0, path.size() - ending.size())) + std::string(stream_ending);
+        if (streams.contains(other)) return true;
+    }
+    return false;
+}
+
+}  // namespace
+
 std::vector<ListedFile> ServedFiles::list() const {
     std::vector<ListedFile> out;
+    std::set<std::string_view> streams;
+    for (const auto& [name, path] : named_) streams.insert(name);
     for (const auto& [name, path] : named_)
-        if (const auto file = file_at(path)) out.push_back({name, file->size});
+        if (const auto file = file_at(path); file && !is_sibling(name, streams)) out.push_back({name, file->size});
     if (!folder_) return out;
     const std::string_view endings[] = {stream_ending, picture_endings[0], picture_endings[1]};
     const auto files = folder_->files(endings);
     std::set<std::string_view> pictures;
-    for (const auto& file : files)
-        if (!file.path.ends_with(stream_ending)) pictures.insert(file.path);
+    for (const auto& file : files) (file.path.ends_with(stream_ending) ? streams : pictures).insert(file.path);
     for (const auto& [path, size] : files) {
-        if (!path.ends_with(stream_ending)) continue;
+        if (!path.ends_with(stream_ending) || is_sibling(path, streams)) continue;
         ListedFile& stream = out.emplace_back(ListedFile{path, size});
         const auto name = path.substr(0, path.size() - stream_ending.size());
         for (const char* picture : {".jpg", ".png"})

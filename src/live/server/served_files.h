@@ -59,6 +59,10 @@ private:
     OpenFile folder_;
 };
 
+// How siblings are called: of person.htvm, person.h264.htvm has the same meshes, and pictures by another coder, for
+// browsers that do not decode its own. They are served, and not listed.
+inline constexpr std::string_view sibling_coders[] = {"av1", "vp9", "h264"};
+
 // A file under a name of its own, wherever it lies.
 struct NamedFile {
     std::string name;  // below /files/: segments joined by slashes

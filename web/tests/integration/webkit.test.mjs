@@ -101,6 +101,26 @@ test('segments, and an .mp4, play as the bare stream does, and seeks find the sa
     assert.deepEqual(lines, [bare[75], bare[21], bare[89]]);
 });
 
+test('pictures are shown by a coder that this engine decodes, of a sibling if need be, and else words say what is missing', withProgram, async () => {
+    const run = (...words) => execFileSync(program, [...words, '--quiet'], { cwd: work, stdio: 'pipe' });
+    run('synth', 'textured', '--frames', '12', '--vertices', '1000', '--texture', '128');
+    run('encode', 'textured', '--texture-size', '256', '-o', 'textured.htvm');
+    run('transcode', 'textured.htvm');
+    run('transcode', 'textured.htvm', '--texture-codec', 'vp9');
+    await openPage();
+    const seen = await inPage(async (src) => {
+        const decodes = async (codec) => (await VideoDecoder.isConfigSupported({ codec, codedWidth: 256, codedHeight: 256 }).catch(() => null))?.supported === true;
+        const can = { AV1: await decodes('av01.0.04M.08'), VP9: await decodes('vp09.00.40.08'), 'H.264': await decodes('avc1.640028') };
+        await test.playAll({ src });
+        return { can, coder: test.player.statistics.pictures?.coder ?? null, notices: test.notices };
+    }, '/segments/textured.htvm');
+    const expected = ['AV1', 'VP9', 'H.264'].find((coder) => seen.can[coder]) ?? null;
+    console.log(JSON.stringify(seen));
+    assert.equal(seen.coder, expected);
+    if (expected) assert.deepEqual(seen.notices, []);
+    else assert.match(seen.notices.join(' '), /AV1, cannot be shown here/);
+});
+
 test('segments of a live ladder play on, each frame at its time', withProgram, async () => {
     execFileSync(program, ['synth', join(work, 'capture'), '--frames', '60', '--vertices', '500', '--quiet']);
     execFileSync(program, ['encode', join(work, 'capture'), '--ladder', 'q15,q45', '--segment', '1', '--effort', '1', '--quiet', '-o', join(work, 'person.m3u8')]);

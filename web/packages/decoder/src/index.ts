@@ -3,7 +3,7 @@ export type { AudioPacket } from './audio.js';
 export { crc32 } from './crc32.js';
 export { Decoder, DecoderError, DecoderModule } from './decoder.js';
 export type { DecoderOptions, ErrorCode, Axis, Frame, FrameKind, IndexEntry, SequenceInfo } from './decoder.js';
-export { codecString, isKeyPicture, isVideo, readPicture } from './picture.js';
+export { codecDescription, codecString, isKeyPicture, isVideo, readPicture } from './picture.js';
 export type { PictureCoder, TexturePicture } from './picture.js';
 export { streamVersion } from './layouts.js';
 export {

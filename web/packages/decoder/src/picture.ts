@@ -1,9 +1,9 @@
 // Texture pictures beside the frames: docs/bitstream.md, section 14. What the coder wrote is decoded by the browser.
 import { closingSize, headerSize, packetKind, type Packet, type PacketHeader } from './packets.js';
 
-export type PictureCoder = 'AV1' | 'VP9' | 'PNG' | 'JPEG' | 'WebP';
+export type PictureCoder = 'AV1' | 'VP9' | 'H.264' | 'PNG' | 'JPEG' | 'WebP';
 
-const coders: Readonly<Record<number, PictureCoder>> = { 1: 'AV1', 2: 'VP9', 16: 'PNG', 17: 'JPEG', 18: 'WebP' };
+const coders: Readonly<Record<number, PictureCoder>> = { 1: 'AV1', 2: 'VP9', 3: 'H.264', 16: 'PNG', 17: 'JPEG', 18: 'WebP' };
 const mostSide = 4096;
 
 /** The picture that is drawn on the mesh of one frame. */
@@ -28,7 +28,7 @@ export function isKeyPicture({ kind, frame, reference }: PacketHeader): boolean 
 
 /** True where pictures may need those before them. */
 export function isVideo(coder: PictureCoder): boolean {
-    return coder === 'AV1' || coder === 'VP9';
+    return coder === 'AV1' || coder === 'VP9' || coder === 'H.264';
 }
 
 /** The picture in a packet of that kind; null if it is malformed, or of a coder or matrix that is not known. */
@@ -60,6 +60,7 @@ export function readPicture(packet: Packet): TexturePicture | null {
 /** What WebCodecs call the codec of a key picture, such as av01.0.08M.08; null where its bytes are not what they should be. */
 export function codecString({ coder, coded, width, height }: Pick<TexturePicture, 'coder' | 'coded' | 'width' | 'height'>): string | null {
     if (coder === 'AV1') return av1String(coded);
+    if (coder === 'H.264') return h264String(coded);
     if (coder !== 'VP9') return null;
     // The first byte: two bits that are 10, the profile's low and high bit.
     const first = coded[0] ?? 0;
@@ -126,4 +127,41 @@ function sequenceString(payload: Uint8Array): string | null {
     }
     if (profile !== 0 || at > 8 * payload.length) return null;
     return `av01.0.${String(level).padStart(2, '0')}${tier ? 'H' : 'M'}.08`;
+}
+
+// ---- H.264: NAL units, each behind its size in four bytes ---------------------------------------------------------------
+
+/** The parameter sets of a key picture; null where they are not there, or of a profile that streams do not have. */
+function parameterSets(coded: Uint8Array): { sequence: Uint8Array; picture: Uint8Array } | null {
+    let sequence: Uint8Array | null = null;
+    let picture: Uint8Array | null = null;
+    const view = new DataView(coded.buffer, coded.byteOffset, coded.byteLength);
+    for (let at = 0; at < coded.length;) {
+        if (coded.length - at < 4) return null;
+        const size = view.getUint32(at);
+        at += 4;
+        if (size < 1 || size > coded.length - at) return null;
+        const unit = coded.subarray(at, at + size);
+        at += size;
+        if ((unit[0]! & 31) === 7) sequence ??= unit;
+        if ((unit[0]! & 31) === 8) picture ??= unit;
+    }
+    if (!sequence || !picture || sequence.length < 4 || sequence.length > 65535 || picture.length > 65535) return null;
+    return [66, 77, 100].includes(sequence[1]!) ? { sequence, picture } : null;
+}
+
+function h264String(coded: Uint8Array): string | null {
+    const sets = parameterSets(coded);
+    return sets && `avc1.${[...sets.sequence.subarray(1, 4)].map((byte) => byte.toString(16).padStart(2, '0')).join('')}`;
+}
+
+/** What WebCodecs call the description of a key picture, which decoders of H.264 need: the record avcC of its parameter sets. */
+export function codecDescription({ coder, coded }: Pick<TexturePicture, 'coder' | 'coded'>): Uint8Array | null {
+    const sets = coder === 'H.264' ? parameterSets(coded) : null;
+    if (!sets) return null;
+    const { sequence, picture } = sets;
+    const size = (length: number): number[] => [length >> 8, length & 255];
+    const record = [1, ...sequence.subarray(1, 4), 0xff, 0xe1, ...size(sequence.length), ...sequence, 1, ...size(picture.length), ...picture];
+    if (sequence[1] === 100) record.push(0xfd, 0xf8, 0xf8, 0);
+    return Uint8Array.from(record);
 }

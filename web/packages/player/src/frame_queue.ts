@@ -11,6 +11,8 @@ export interface FrameQueueListener {
     done(frame: FrameReport): void;
     /** A picture can be shown from now on, or will never be; frame: the one ahead that has it. */
     pictureSettled(frame: FrameReport | null): void;
+    /** The browser has no decoder for the pictures: as of PicturesListener. */
+    lacks(coder: string): Promise<boolean>;
     notice(text: string): void;
 }
 
@@ -32,6 +34,7 @@ export class FrameQueue {
         this.#pictures = new Pictures({
             settled: (id) => listener.pictureSettled(this.#ahead.find(({ picture }) => picture === id) ?? null),
             isNeeded: (id) => this.#preview?.picture === id || this.#ahead.some(({ picture }) => picture === id),
+            lacks: (coder) => listener.lacks(coder),
             notice: (text) => listener.notice(text),
         });
     }

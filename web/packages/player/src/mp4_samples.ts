@@ -80,7 +80,7 @@ export class SampleReader {
         let whole = 0; // behind what was taken
         for (let at = 0; at + 32 <= sample.length; ) {
             if (at + partedHeader <= sample.length && view.getUint32(at) === partedSync) {
-                const prefix = view.getUint32(at + 44);
+                const prefix = view.getUint32(at + 44, true);
                 if (prefix > sample.length - at - partedHeader) break;
                 parts.push(sample.subarray(whole, at));
                 const packet = await this.#parted(sample.subarray(at, at + partedHeader + prefix));
@@ -100,7 +100,7 @@ export class SampleReader {
     async #parted(part: Uint8Array): Promise<Uint8Array | null> {
         const view = new DataView(part.buffer, part.byteOffset, part.byteLength);
         const kind = kinds[part[4]!];
-        const count = view.getUint16(6);
+        const count = view.getUint16(6, true);
         const header = readPacketHeader(part, 8);
         const prefix = part.subarray(partedHeader);
         if (!header || !kind || count === 0) return null;

@@ -207,7 +207,7 @@ function readTrack(trak: Uint8Array, most: number): Track | null {
 }
 
 function readDescriptions(stsd: Uint8Array): Pick<Track, 'kind' | 'configurations'> | null {
-    const kinds: Record<string, TrackKind> = { htvm: 'meshes', av01: 'pictures', vp09: 'pictures', Opus: 'sound' };
+    const kinds: Record<string, TrackKind> = { htvm: 'meshes', av01: 'pictures', vp09: 'pictures', avc3: 'pictures', Opus: 'sound' };
     const configurations: Uint8Array[] = [];
     let kind: TrackKind | null = null;
     const fields = new Fields(stsd);

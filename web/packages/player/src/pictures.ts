@@ -1,6 +1,6 @@
 // Texture pictures: decoded by the browser, a few ahead, in order from key pictures on. Whoever shows a frame asks whether its
 // picture is there, takes it, and closes it.
-import { codecString, isVideo } from '@htvm/decoder';
+import { codecDescription, codecString, isVideo } from '@htvm/decoder';
 import type { PictureReport } from './messages.js';
 
 /** A decoded picture. Close its image once it is on the graphics card. */
@@ -18,6 +18,8 @@ export interface PicturesListener {
     settled(id: number): void;
     /** Whether a frame that is not shown yet has this picture. */
     isNeeded(id: number): boolean;
+    /** The browser has no decoder for these. True where the pictures come from elsewhere from now on, so that nothing is missing. */
+    lacks(coder: string): Promise<boolean>;
     notice(text: string): void;
 }
 
@@ -121,6 +123,7 @@ export class Pictures {
         this.#decoder = null;
         this.#errors = 0;
         this.#said.clear();
+        this.#supported = new Map(); // what another stream is asked to have anew
     }
 
     /** Pictures that hold memory of the browser's decoder. */
@@ -167,16 +170,11 @@ export class Pictures {
             // As if it were sRGB, so that nothing but the matrix is applied.
             colorSpace: { matrix: key.matrix, primaries: 'bt709', transfer: 'iec61966-2-1', fullRange: key.fullRange },
         };
-        const text = JSON.stringify(config);
+        const description = codecDescription(key);
+        const text = JSON.stringify({ ...config, description: description && [...description] });
+        if (description) config.description = description;
         const supported = this.#supported.get(text);
-        if (supported === undefined) {
-            this.#supported.set(text, null);
-            const answer = (is: boolean): void => {
-                this.#supported.set(text, is);
-                this.#feed();
-            };
-            VideoDecoder.isConfigSupported(config).then(({ supported: is }) => answer(is === true), () => answer(false));
-        }
+        if (supported === undefined) void this.#ask(config, text, key.coder);
         if (supported == null) return 'asked';
         if (!supported) return this.#cannot(key.coder, `this browser has no decoder for ${codec}`);
         if (!this.#decoder || this.#decoder.state === 'closed') {
@@ -186,6 +184,19 @@ export class Pictures {
         if (this.#config !== text) this.#decoder.configure(config);
         this.#config = text;
         return 'yes';
+    }
+
+    async #ask(config: VideoDecoderConfig, text: string, coder: string): Promise<void> {
+        const answers = this.#supported;
+        answers.set(text, null);
+        const is = await VideoDecoder.isConfigSupported(config).then(({ supported }) => supported === true, () => false);
+        const elsewhere = !is && answers === this.#supported && (await this.#listener.lacks(coder));
+        if (elsewhere || answers !== this.#supported) {
+            answers.delete(text);
+            return;
+        }
+        answers.set(text, is);
+        this.#feed();
     }
 
     #decodeVideo(next: Numbered): void {

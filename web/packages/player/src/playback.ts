@@ -7,6 +7,7 @@ import type { LiveNumbers, LiveStateDetail } from './live_state.js';
 import { LiveTimeline } from './live_timeline.js';
 import type { AudioReport, FailureCode, FrameReport, LadderReport, LiveReport, Report, SourceKind } from './messages.js';
 import type { DecodedPicture } from './pictures.js';
+import { siblingOf } from './siblings.js';
 import type { PlaybackTime, SoundOutput, SoundTrack } from './sound_track.js';
 import type { TimedPlayback, Timeline } from './timeline.js';
 import { WorkerLink } from './worker_link.js';
@@ -60,6 +61,7 @@ export class Playback implements TimedPlayback {
     #worker: WorkerLink;
     #wasmUrl: string;
     #url = '';
+    #isSibling = false; // it is another file than the one that was opened
     #serial = 0;
     #openedSerial = 0; // nobody has sought anything since the stream was opened
     #endedSerial = -1;
@@ -86,6 +88,7 @@ export class Playback implements TimedPlayback {
                 listener.arrived();
                 this.#checkIdle();
             },
+            lacks: (coder) => this.#goToSibling(coder),
             notice: (text) => listener.notice(text),
         });
     }
@@ -154,6 +157,7 @@ export class Playback implements TimedPlayback {
     open(url: string, source: SourceKind = 'file'): void {
         this.close();
         this.#url = url;
+        this.#isSibling = false;
         this.#timeline = new timelines[source](this);
         this.#traps = [];
         this.#failed = false;
@@ -362,6 +366,24 @@ export class Playback implements TimedPlayback {
         this.#listener.notice(`A part of the stream stopped the decoder, which was started again: ${text}.`);
         this.#listener.restarted();
         this.#start(this.timeUs);
+    }
+
+    // The same stream with pictures that the browser decodes, if it lies beside this one; from where this one is.
+    async #goToSibling(coder: string): Promise<boolean> {
+        const from = this.#url;
+        if (this.#timeline.source !== 'file' || this.#isSibling) return false;
+        const sibling = await siblingOf(from, coder);
+        if (this.#url !== from) return true; // it is another stream by now
+        if (sibling === null) return false;
+        const at = this.timeUs;
+        this.#worker.stop();
+        this.#queue.abandon();
+        this.#queue.forgetPictures();
+        this.#isSibling = true;
+        this.#url = sibling;
+        this.#listener.restarted();
+        this.#start(at);
+        return true;
     }
 
     #fail(code: FailureCode, text: string): void {

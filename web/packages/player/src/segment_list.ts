@@ -4,6 +4,7 @@
 import { SourceError } from './byte_source.js';
 import { readPlaylist, type MediaPlaylist, type Segment, type Variant } from './playlist.js';
 import { fetchFile, pause } from './segment_fetch.js';
+import { decodable } from './siblings.js';
 
 const edgeTargets = 3; // so many target durations before the end of a live list playing begins;
 const edgeTargetsAsked = 2.5; // so many where the server says at once what comes;
@@ -105,7 +106,7 @@ export class SegmentLists {
             variant, list: null, bytes: 0, readMs: 0, failures: 0, putOffMs: 0, offMs: 0, shift: 0, vain: 0, doesNotWait: false, brokenHints: 0,
         });
         if ('variants' in read) {
-            this.#rungs = read.variants.map(rung);
+            this.#rungs = (await decodable(read.variants)).map(rung);
             const lowest = this.#rungs[0]!;
             const its = await this.#await(lowest.variant.url, signal);
             this.#take(lowest, readSegmentList(its.text, its.url), its.size);

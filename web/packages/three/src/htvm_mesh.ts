@@ -136,7 +136,7 @@ export class PictureMap extends Texture {
     constructor() {
         super();
         this.colorSpace = NoColorSpace; // the material does it, behind the gains
-        this.generateMipmaps = false; // they would mix the charts of the picture
+        this.generateMipmaps = false; // the material takes means by itself, within the charts of the picture
         this.minFilter = this.magFilter = LinearFilter;
         // Pictures go to the graphics card as they are, the upper row first.
         this.flipY = false;
@@ -158,6 +158,26 @@ export class PictureMap extends Texture {
     }
 }
 
+// Seen from afar a pixel shows many texels, whose mean it takes: of some across and down, each between its nearest four. Not of
+// more than the gutters between charts allow, four texels each way (docs/textures.md): beyond lie other charts' colours. Levels of half the size,
+// as graphics cards make them, would mix charts from the third one on, and have to be made anew with each picture.
+const meanOfTexels = `
+    vec2 side = vec2(textureSize(map, 0));
+    vec2 across = dFdx(vMapUv);
+    vec2 down = dFdy(vMapUv);
+    vec2 texels = vec2(length(across * side), length(down * side));
+    int taps = int(clamp(ceil(max(texels.x, texels.y)), 1.0, 4.0));
+    across *= min(1.0, 8.0 / max(texels.x, 1e-6));
+    down *= min(1.0, 8.0 / max(texels.y, 1e-6));
+    vec3 picture = vec3(0.0);
+    for (int j = 0; j < taps; ++j)
+        for (int i = 0; i < taps; ++i) {
+            vec2 from = (vec2(i, j) + 0.5) / float(taps) - 0.5;
+            picture += texture2D(map, vMapUv + from.x * across + from.y * down).rgb;
+        }
+    picture /= float(taps * taps);
+`;
+
 /** Makes a material show the picture instead of vertex colours. Only of a frame with texture coordinates. */
 export function pictured<M extends Material & { map: Texture | null; vertexColors: boolean }>(material: M, map: PictureMap): M {
     material.map = map;
@@ -166,7 +186,8 @@ export function pictured<M extends Material & { map: Texture | null; vertexColor
         shader.uniforms['pictureGains'] = { value: map.gains };
         shader.fragmentShader = `uniform vec3 pictureGains;\n${shader.fragmentShader}`.replace(
             '#include <map_fragment>',
-            `vec3 picture = min(texture2D(map, vMapUv).rgb * pictureGains, vec3(1.0));
+            `${meanOfTexels}
+            picture = min(picture * pictureGains, vec3(1.0));
             diffuseColor.rgb *= mix(pow((picture + 0.055) / 1.055, vec3(2.4)), picture / 12.92, vec3(lessThanEqual(picture, vec3(0.04045))));`,
         );
     };
