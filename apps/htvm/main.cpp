@@ -6,8 +6,8 @@ int main(int argc, char** argv) {
     Program program;
     program.name = "htvm";
     program.description = "htvm compresses human time-varying meshes: captured 3D people, one triangle mesh per frame.";
-    program.commands = {add_synth, add_check, add_encode, add_decode, add_info, add_calibrate, add_compare,
-                        add_cut,   add_join,  add_pack};
+    program.commands = {add_synth,     add_check,   add_encode, add_decode, add_info,
+                        add_calibrate, add_compare, add_cut,    add_join,   add_pack};
     const auto add = [&](const std::vector<AddCommand>& commands) {
         program.commands.insert(program.commands.end(), commands.begin(), commands.end());
     };
@@ -18,12 +18,9 @@ int main(int argc, char** argv) {
     add(live_commands());
     program.elsewhere = {{"rd", "htvm-lab rd"}, {"reproduce", "htvm-lab reproduce"}};
     program.built_without = left_out_abilities();
-    program.may_be_left_out = {{"still", "image files"},
-                               {"render", "image files"},
-                               {"transcode", "pictures of textures"},
-                               {"serve", "live streams"},
-                               {"publish", "live streams"},
-                               {"link", "live streams"}};
+    program.may_be_left_out = {
+        {"still", "image files"},  {"render", "image files"},   {"transcode", "pictures of textures"},
+        {"serve", "live streams"}, {"publish", "live streams"}, {"link", "live streams"}};
     program.for_files =
         "'htvm play FILE' shows it, 'htvm info FILE' tells what is in it, 'htvm encode FOLDER' compresses";
     return run_program(program, argc, argv);
