@@ -79,9 +79,13 @@ endforeach()
 
 # The programs, and their man pages and completions, which the programs write from the options that they parse.
 if(HTVM_BUILD_TOOLS)
-  install(TARGETS htvm htvm-lab COMPONENT programs)
+  set(programs htvm)
+  if(htvm_is_whole)
+    list(APPEND programs htvm-lab)
+  endif()
+  install(TARGETS ${programs} COMPONENT programs)
   set(pages "")
-  foreach(program htvm htvm-lab)
+  foreach(program ${programs})
     set(stamp ${PROJECT_BINARY_DIR}/install/${program}.pages)
     add_custom_command(OUTPUT ${stamp}
       COMMAND ${program} --write-pages ${PROJECT_BINARY_DIR}/install/pages

@@ -1,28 +1,9 @@
 # src/live: live streams, the web server of `htvm play` and `htvm serve`, and the player's files, which it carries inside.
 find_package(Boost 1.81 REQUIRED)
-find_package(OpenSSL 3.0 REQUIRED)
 
 if(CMAKE_CROSSCOMPILING)
   # At -O1, g++ 12 for ARM warns of uses before initialisation, and of the memory of coroutines: neither is so.
   add_compile_options(-Wno-maybe-uninitialized -Wno-mismatched-new-delete)
-endif()
-
-# What joins hubs on many machines.
-set(HTVM_NATS AUTO CACHE STRING "htvm serve --nats (needs libnats-dev): ON, OFF, or AUTO, which is ON where it is there")
-if(HTVM_NATS)
-  find_path(NATS_INCLUDE nats/nats.h)
-  find_library(NATS_LIBRARY nats)
-endif()
-set(other_nats_source nats_peering.cpp)
-set(nats_library "")
-if(HTVM_NATS AND NATS_INCLUDE AND NATS_LIBRARY)
-  add_library(htvm_libnats INTERFACE)
-  target_include_directories(htvm_libnats SYSTEM INTERFACE ${NATS_INCLUDE})
-  target_link_libraries(htvm_libnats INTERFACE ${NATS_LIBRARY})
-  set(other_nats_source nats_peering_absent.cpp)
-  set(nats_library htvm_libnats)
-elseif(HTVM_NATS AND NOT HTVM_NATS STREQUAL "AUTO")
-  message(FATAL_ERROR "HTVM_NATS: libnats-dev is not there")
 endif()
 
 set(HTVM_PLAYER "" CACHE STRING
@@ -53,7 +34,7 @@ foreach(path ${player_paths})
 endforeach()
 set(player_cpp ${PROJECT_BINARY_DIR}/live/player_files.cpp)
 file(CONFIGURE OUTPUT ${player_cpp} CONTENT "// Written by cmake/live.cmake.
-#include \"live/server/player_files.h\"
+#include \"live/files/player_files.h\"
 
 #include <vector>
 
@@ -69,9 +50,44 @@ std::span<const PlayerFile> player_files() {
 }  // namespace htvm::live
 " @ONLY)
 set_source_files_properties(${player_cpp} PROPERTIES OBJECT_DEPENDS "${player_paths}")
-# The floors, from below: client, what publishers and watchers need; hub, the streams that hubs carry; server, which
-# connects them to the network.
-htvm_floor(live_client DIRECTORY src/live/client
+# The floors, from below: files, what any server here answers of the player's pages and of files, and the server of
+# `htvm play`; client, what publishers and watchers need; hub, the streams that hubs carry; server, which connects them
+# to the network.
+file(GLOB live_file_sources CONFIGURE_DEPENDS src/live/files/*.cpp)
+htvm_of_system(live_file_sources)
+htvm_floor(live_files SOURCES ${live_file_sources} ${player_cpp} LINKS htvm_core Boost::headers nlohmann_json::nlohmann_json)
+if(WIN32)
+  target_link_libraries(htvm_live_files PUBLIC ws2_32 mswsock)
+endif()
+if(NOT HTVM_LIVE)
+  htvm_floor(live_client SOURCES src/live/client/lines_absent.cpp src/live/client/hub_address.cpp src/live/hub/stream_name.cpp
+    LINKS htvm_decoder)
+  htvm_floor(live LINKS htvm_live_client htvm_live_files)
+  return()
+endif()
+
+find_package(OpenSSL 3.0 REQUIRED)
+# What joins hubs on many machines.
+set(HTVM_NATS AUTO CACHE STRING "htvm serve --nats (needs libnats-dev): ON, OFF, or AUTO, which is ON where it is there")
+if(HTVM_NATS)
+  find_path(NATS_INCLUDE nats/nats.h)
+  find_library(NATS_LIBRARY nats)
+endif()
+set(other_nats_source nats_peering.cpp)
+set(nats_library "")
+if(HTVM_NATS AND NATS_INCLUDE AND NATS_LIBRARY)
+  add_library(htvm_libnats INTERFACE)
+  target_include_directories(htvm_libnats SYSTEM INTERFACE ${NATS_INCLUDE})
+  target_link_libraries(htvm_libnats INTERFACE ${NATS_LIBRARY})
+  set(other_nats_source nats_peering_absent.cpp)
+  set(nats_library htvm_libnats)
+elseif(HTVM_NATS AND NOT HTVM_NATS STREQUAL "AUTO")
+  message(FATAL_ERROR "HTVM_NATS: libnats-dev is not there")
+endif()
+
+file(GLOB client_sources CONFIGURE_DEPENDS src/live/client/*.cpp)
+list(FILTER client_sources EXCLUDE REGEX "/lines_absent\\.cpp$")
+htvm_floor(live_client SOURCES ${client_sources}
   LINKS htvm_decoder htvm_core Boost::headers OpenSSL::SSL nlohmann_json::nlohmann_json)
 htvm_library(live FLOORS live_client LINKS decoder NEEDS OpenSSL::SSL)
 # The same for C (htvm/htvm_live.h), by itself as all libraries for C are.
@@ -81,11 +97,11 @@ file(GLOB hub_sources CONFIGURE_DEPENDS src/live/hub/*.cpp)
 list(FILTER hub_sources EXCLUDE REGEX "/${other_nats_source}$")
 htvm_floor(live_hub SOURCES ${hub_sources} LINKS htvm_live_client ${nats_library})
 file(GLOB server_sources CONFIGURE_DEPENDS src/live/server/*.cpp)
-htvm_floor(live SOURCES ${server_sources} ${player_cpp} LINKS htvm_live_hub htvm_io htvm_container)
+htvm_floor(live SOURCES ${server_sources} LINKS htvm_live_hub htvm_live_files htvm_io htvm_container)
 if(HTVM_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # clang 14 cannot assemble its check of indirect calls in coroutines.
   # PUBLIC: the floors' tests have coroutines too.
-  foreach(floor live_client live_hub live)
+  foreach(floor live_files live_client live_hub live)
     target_compile_options(htvm_${floor} PUBLIC -fno-sanitize=function)
   endforeach()
 endif()

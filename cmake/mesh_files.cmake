@@ -7,17 +7,18 @@ set(draco_found OFF)
 if(DRACO_INCLUDE AND DRACO_LIBRARY)
   set(draco_found ON)
 endif()
-set(HTVM_DRACO ${draco_found} CACHE BOOL "Read Draco files (needs libdraco)")
+# The programs leave it out where they are told to (cmake/abilities.cmake), the Python package where it is not there.
+if(NOT DEFINED HTVM_DRACO)
+  set(HTVM_DRACO ${draco_found})
+endif()
 if(HTVM_DRACO AND NOT draco_found)
-  message(FATAL_ERROR "HTVM_DRACO: libdraco is not there")
-elseif(HTVM_BUILD_TOOLS AND NOT HTVM_DRACO)
-  message(FATAL_ERROR "The programs need Draco (libdraco-dev); HTVM_BUILD_TOOLS=OFF builds the libraries alone")
+  message(FATAL_ERROR "libdraco is not there (libdraco-dev); HTVM_DRACO=OFF leaves it out")
 endif()
 
 # Images and textures are apart (cmake/tools.cmake), and the programs that read videos of them, so that the Python library,
 # which reads meshes alone, needs none of their libraries.
 file(GLOB io_sources CONFIGURE_DEPENDS src/io/*.cpp)
-list(FILTER io_sources EXCLUDE REGEX "/((image|texture)_[a-z]*|child_program)\\.cpp$")
+list(FILTER io_sources EXCLUDE REGEX "/((image|texture)_[a-z_]*|child_program)\\.cpp$")
 if(HTVM_DRACO)
   add_library(htvm_libdraco INTERFACE)
   target_include_directories(htvm_libdraco SYSTEM INTERFACE ${DRACO_INCLUDE})

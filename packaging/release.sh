@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Puts a release together in a folder: packaging/release.sh FOLDER
 # From what is committed: the source archive, Python's source distribution, Debian's source package, the changes since
-# the last version. From what is built: wheels, npm packages, Debian packages, the C library for ARM and Windows; it says
+# the last version. From what is built: wheels, npm packages, Debian packages, the C library for ARM and Windows, htvm.exe; it says
 # what it has not found, and which command makes it. Then the sizes of all, and their checksums (SHA256SUMS).
 # The same commit and the same builds give the same bytes.
 set -euo pipefail
@@ -62,6 +62,17 @@ for build in package aarch64 windows; do
 done
 find "$stripped" -type f -print0 | LC_ALL=C sort -z | xargs -0 packaging/unity.py "$out" >/dev/null
 rm -r "$stripped"
+
+# htvm.exe, one file, without the player where ./dev web has not built it.
+if [ -f build/windows/htvm.exe ]; then
+    folder=$(mktemp -d)
+    cp LICENSE docs/platforms.md "$folder/"
+    x86_64-w64-mingw32-strip -o "$folder/htvm.exe" build/windows/htvm.exe
+    pack "htvm-$version-windows-x86_64" "$folder"
+    rm -r "$folder"
+else
+    missing "htvm.exe" "./dev platforms windows"
+fi
 
 wheels=0
 for library in build/{package,release,aarch64,windows}/python/{libhtvm.so,libhtvm.dll}; do

@@ -1,8 +1,5 @@
 #include "command_line/mesh_pipe.h"
 
-#include <poll.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -15,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "command_line/console.h"
 #include "command_line/interruption.h"
 #include "io/ply.h"
 
@@ -33,12 +31,10 @@ public:
 private:
     int_type underflow() override {
         while (interruption() == 0 && !unwanted_) {
-            pollfd input = {STDIN_FILENO, POLLIN, 0};
-            constexpr int look_up_after = 100;  // milliseconds
-            if (poll(&input, 1, look_up_after) <= 0) continue;
-            const auto got = read(STDIN_FILENO, bytes_.data(), bytes_.size());
-            if (got <= 0) break;
-            setg(bytes_.data(), bytes_.data(), bytes_.data() + got);
+            const auto got = read_input(bytes_);
+            if (got.is_end) break;
+            if (got.bytes == 0) continue;
+            setg(bytes_.data(), bytes_.data(), bytes_.data() + got.bytes);
             return traits_type::to_int_type(bytes_[0]);
         }
         return traits_type::eof();

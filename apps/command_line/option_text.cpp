@@ -1,8 +1,6 @@
 #include "command_line/option_text.h"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -14,6 +12,7 @@
 #include <string_view>
 #include <utility>
 
+#include "command_line/console.h"
 #include "command_line/program.h"
 
 namespace htvm::app {
@@ -73,8 +72,7 @@ std::size_t terminal_width() {
     constexpr std::size_t usual = 100, least = 60;
     std::size_t columns = 0;
     if (const char* said = std::getenv("COLUMNS")) std::from_chars(said, said + std::strlen(said), columns);
-    winsize size{};
-    if (columns == 0 && ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0) columns = size.ws_col;
+    if (columns == 0) columns = columns_of_output();
     return columns == 0 ? usual : std::max(columns, least);
 }
 

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "command_line/completion.h"
+#include "command_line/console.h"
 #include "command_line/interruption.h"
 #include "command_line/manual.h"
 #include "command_line/option_text.h"
@@ -205,6 +206,22 @@ bool names_no_command(const CLI::App& app, const std::string& word) {
     return !word.starts_with('-') && std::find(commands.begin(), commands.end(), word) == commands.end();
 }
 
+// Whether the word is a command that this build lacks.
+bool is_left_out(const Program& program, const std::string& word) { return program.may_be_left_out.contains(word); }
+
+void say_left_out(const Program& program, const std::string& word) {
+    fmt::print(stderr,
+               "{}: error: this {} was built without {}, so it has no command '{}'; docs/platforms.md tells more\n",
+               program.name, program.name, program.may_be_left_out.at(word), word);
+}
+
+// "htvm 0.1.0", and in a second line what is missing.
+std::string version_text(const Program& program) {
+    const auto version = program.name + " " HTVM_VERSION;
+    if (program.built_without.empty()) return version;
+    return fmt::format("{}\nbuilt without {}", version, fmt::join(program.built_without, ", "));
+}
+
 void say_no_such_command(const Program& program, const CLI::App& app, const std::string& word) {
     const auto found = program.elsewhere.find(word);
     const auto meant = meant_word(word, command_names(app));
@@ -250,8 +267,7 @@ Result<void> write_pages(const Program& program, const CLI::App& app, const std:
 }
 
 // "help encode" is "encode --help".
-std::vector<std::string> asked_words(int argc, char** argv) {
-    std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+std::vector<std::string> asked_words(const std::vector<std::string>& words) {
     if (words.empty() || words[0] != "help") return words;
     return words.size() > 1 ? std::vector<std::string>{words[1], "--help"} : std::vector<std::string>{"--help"};
 }
@@ -283,30 +299,36 @@ void add_front_page(CLI::App& command, FrontPage page) {
 }
 
 int run_program(const Program& program, int argc, char** argv) {
+    prepare_console();
     speak_as(program.name);
     CLI::App app{program.description, program.name};
+    app.allow_windows_style_options(false);  // what begins with a slash is a file there, too
     app.footer(fmt::format("Exit codes: {}.\n'{} COMMAND --help' explains a command.{}{}", exit_codes_text(),
                            program.name, program.footer.empty() ? "" : "\n", program.footer));
-    app.set_version_flag("-V,--version", program.name + " " HTVM_VERSION);
+    app.set_version_flag("-V,--version", version_text(program));
     app.failure_message(usage_message);
     app.formatter(help_formatter());
     app.require_subcommand(1);
     accept_help_all(app);
     Run run;
     for (const auto add : program.commands) add(app, run);
-    const auto words = asked_words(argc, argv);
+    const auto given = given_words(argc, argv), words = asked_words(given);
     for (auto* command : app.get_subcommands([](const CLI::App*) { return true; })) {
         command->add_flag_callback("--quiet", quieten, "Say nothing but warnings and errors");
         accept_help_all(*command);
         command->preparse_callback([command, &words](std::size_t) { refuse_values_of_switches(*command, words); });
     }
     app.add_subcommand("help", fmt::format("Explain a command: {} help COMMAND", program.name));
+    if (!words.empty() && names_no_command(app, words[0]) && is_left_out(program, words[0])) {
+        say_left_out(program, words[0]);
+        return exit_code(ErrorKind::unsupported);
+    }
     if (!words.empty() && names_no_command(app, words[0])) {
         say_no_such_command(program, app, words[0]);
         return 2;
     }
-    if (argc == 3 && std::string_view(argv[1]) == "--write-pages") {
-        const auto written = write_pages(program, app, argv[2]);
+    if (given.size() == 2 && given[0] == "--write-pages") {
+        const auto written = write_pages(program, app, given[1]);
         return written ? 0 : exit_with(program, written.error());
     }
     try {

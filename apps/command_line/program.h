@@ -27,6 +27,9 @@ struct Program {
     std::string footer;       // at the end of --help, after the exit codes; may be empty
     std::vector<AddCommand> commands;
     std::map<std::string, std::string> elsewhere = {};  // commands of another program, and what to type for them
+    std::vector<std::string> built_without = {};        // abilities that were left out, for --version
+    std::map<std::string, std::string> may_be_left_out =
+        {};                      // commands, and the ability without which they are missing
     std::string for_files = "";  // what people who type a file's name in place of a command may have meant
 };
 

@@ -1,11 +1,11 @@
 #include "command_line/terminal.h"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstdio>
 
+#include "command_line/console.h"
 #include "command_line/visible.h"
 
 namespace htvm::app {
@@ -40,7 +40,7 @@ Progress::Progress(std::string what, std::size_t total) : what_(std::move(what))
 void Progress::step(const std::string& detail) {
     ++done_;
     const long long now = now_ms();
-    if (quiet || !isatty(STDERR_FILENO) || (now - last_ms_ < 100 && done_ != total_)) return;
+    if (quiet || !errors_go_to_terminal() || (now - last_ms_ < 100 && done_ != total_)) return;
     last_ms_ = now;
     shown_ = true;
     const double seconds = static_cast<double>(now - start_ms_) / 1000.0;

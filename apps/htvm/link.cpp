@@ -9,9 +9,9 @@
 #include <string_view>
 
 #include "commands.h"
+#include "live/files/http_request.h"
 #include "live/hub/stream_name.h"
 #include "live/server/credentials.h"
-#include "live/server/http_request.h"
 
 namespace htvm::app {
 namespace {

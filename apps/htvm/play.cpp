@@ -1,7 +1,6 @@
 // htvm play: a stream or a capture in a web browser, by the server and the player that the program carries inside.
 // htvm demo: the same of a stream that the program carries inside, too.
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -12,16 +11,17 @@
 #include <sstream>
 #include <vector>
 
+#include "browser.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "demo_stream.h"
 #include "encode.h"
-#include "io/child_program.h"
 #include "io/number_text.h"
 #include "io/output_file.h"
 #include "io/recording.h"
-#include "live/server/player_files.h"
-#include "live/server/server.h"
+#include "io/system_file.h"
+#include "live/files/local_server.h"
+#include "live/files/player_files.h"
 #include "picture_options.h"
 #include "sequences.h"
 #include "stream_file.h"
@@ -53,9 +53,11 @@ struct TemporaryFolder {
     }
     bool make() {
         std::error_code error;
-        auto name = (fs::temp_directory_path(error) / "htvm-XXXXXX").string();
-        if (error || !mkdtemp(name.data())) return false;
-        path = name;
+        const auto place = fs::temp_directory_path(error);
+        if (error) return false;
+        auto made = make_own_folder(place / "htvm-");
+        if (!made) return false;
+        path = std::move(*made);
         return true;
     }
 };
@@ -126,12 +128,6 @@ bool holds_streams(const fs::path& folder) {
     return false;
 }
 
-// It may run as long as the browser does, and says nothing.
-void open_browser(const std::string& url) {
-    const bool screen = std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY") || std::getenv("BROWSER");
-    if (screen) start_program({"xdg-open", url}, {our_stream, no_stream, no_stream});
-}
-
 // For captures that streams are compared with: every vertex and triangle, each frame by itself.
 EncodeRequest nearly_lossless() {
     EncodeRequest out;
@@ -196,10 +192,8 @@ Result<void> play(const PlayOptions& options) {
                     "this htvm was built without the web player: ./dev web builds it, then configure and build again");
     std::error_code error;
     const auto& inputs = options.inputs;
-    live::ServerOptions server;
+    live::LocalServerOptions server;
     server.port = options.port;
-    server.admission.loopback_names = true;
-    server.drain_time = {};
     TemporaryFolder temporary, beside_temporary;
     std::string query;
     if (options.beside.empty() && inputs.size() == 1 && fs::is_directory(inputs[0], error) &&
@@ -225,13 +219,13 @@ Result<void> play(const PlayOptions& options) {
     add_siblings(server.files);
     if (!server.files.empty()) add_to(query, "up", up_of(server.files[0].path));
     add_to(query, "orbit", options.orbit);
-    auto opened = live::Server::open(server);
+    auto opened = live::LocalServer::open(server);
     if (!opened) return tl::unexpected(opened.error());
     const auto url = fmt::format("http://127.0.0.1:{}/{}", opened->port(), query);
     fmt::print("{}\n", url);
     std::fflush(stdout);
     note("Open this address in a browser. Ctrl-C ends.");
-    if (!options.no_open) open_browser(url);
+    if (!options.no_open) open_in_browser(url);
     opened->run();
     return {};
 }

@@ -19,10 +19,10 @@
 #include "command_line/headings.h"
 #include "command_line/terminal.h"
 #include "commands.h"
+#include "live/files/http_request.h"
+#include "live/files/player_files.h"
 #include "live/server/credentials.h"
-#include "live/server/http_request.h"
 #include "live/server/live_segments.h"
-#include "live/server/player_files.h"
 #include "live/server/recorder.h"
 #include "live/server/server.h"
 

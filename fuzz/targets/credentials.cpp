@@ -3,8 +3,8 @@
 #include "live/server/credentials.h"
 
 #include "fuzz_input.h"
+#include "live/files/http_request.h"
 #include "live/hub/stream_name.h"
-#include "live/server/http_request.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;

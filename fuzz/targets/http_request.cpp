@@ -1,5 +1,5 @@
 // What a web client sends: paths never lead out of the folder, parts lie within the file.
-#include "live/server/http_request.h"
+#include "live/files/http_request.h"
 
 #include "fuzz_input.h"
 

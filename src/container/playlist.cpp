@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <optional>
 
 #include "container/box.h"
@@ -114,14 +114,17 @@ std::string decimal(double seconds) {
 }
 
 std::string date(std::int64_t unix_ms) {
-    const auto seconds = static_cast<std::time_t>(unix_ms / 1000);
-    std::tm parts{};
-    if (!gmtime_r(&seconds, &parts)) return "";
-    std::array<char, 64> out{};
-    std::strftime(out.data(), out.size(), "%Y-%m-%dT%H:%M:%S", &parts);
-    std::array<char, 16> thousandths{};
-    std::snprintf(thousandths.data(), thousandths.size(), ".%03dZ", static_cast<int>(unix_ms % 1000));
-    return std::string(out.data()) + thousandths.data();
+    using namespace std::chrono;
+    const sys_time<milliseconds> time{milliseconds(unix_ms)};
+    const auto day = floor<days>(time);
+    const year_month_day date{day};
+    const hh_mm_ss clock{time - day};
+    std::array<char, 96> out{};
+    std::snprintf(out.data(), out.size(), "%04d-%02u-%02uT%02d:%02d:%02d.%03dZ", static_cast<int>(date.year()),
+                  static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
+                  static_cast<int>(clock.hours().count()), static_cast<int>(clock.minutes().count()),
+                  static_cast<int>(clock.seconds().count()), static_cast<int>(clock.subseconds().count()));
+    return out.data();
 }
 
 // That players may ask for what is not there yet, and how far they are to stay behind the end where there are parts.

@@ -1,13 +1,8 @@
 #include "io/image_file.h"
 
-#include <png.h>
-#include <turbojpeg.h>
-#include <webp/decode.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <memory>
 #include <string>
 #include <utility>
 
@@ -15,6 +10,8 @@
 #include "io/image_dds.h"
 #include "io/image_format.h"
 #include "io/image_jpeg.h"
+#include "io/image_png.h"
+#include "io/image_webp.h"
 #include "io/mesh_file.h"
 
 namespace htvm {
@@ -72,20 +69,15 @@ Result<std::string> damage_of(const char* format, double missing, const std::str
     return "is cut off: the last " + std::to_string(percent) + " % of it are grey or black";
 }
 
-}  // namespace internal
-
-namespace {
-
-std::size_t bytes_of(int width, int height, std::size_t channels) {
-    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * channels;
-}
-
-// Leaves out the fourth channel, in place: of a large image there is no room for two.
 Image without_alpha(int width, int height, std::vector<std::uint8_t> rgba) {
     for (std::size_t p = 0; 4 * p < rgba.size(); ++p) std::memmove(&rgba[3 * p], &rgba[4 * p], 3);
     rgba.resize(rgba.size() / 4 * 3);
     return {width, height, std::move(rgba)};
 }
+
+}  // namespace internal
+
+namespace {
 
 constexpr std::uint8_t png_signature[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 
@@ -93,60 +85,9 @@ bool begins_with(std::span<const std::uint8_t> bytes, std::span<const std::uint8
     return bytes.size() >= what.size() && std::equal(what.begin(), what.end(), bytes.begin());
 }
 
-Result<Image> read_png(std::span<const std::uint8_t> bytes, int largest_side, std::string* damage) {
-    png_image png;
-    std::memset(&png, 0, sizeof png);
-    png.version = PNG_IMAGE_VERSION;
-    if (!png_image_begin_read_from_memory(&png, bytes.data(), bytes.size())) {
-        const std::string why = png.message;
-        png_image_free(&png);
-        return damaged_image("PNG", why);
-    }
-    if (auto ok = check_image_size(png.width, png.height, largest_side); !ok) {
-        png_image_free(&png);
-        return tl::unexpected(ok.error());
-    }
-    png.format = PNG_FORMAT_RGBA;
-    png.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;    // where the file says no gamma
-    constexpr std::size_t interlaced_at = 28;  // within the first chunk, IHDR, which has been read
-    const bool is_interlaced = bytes[interlaced_at] != 0;
-    const int width = static_cast<int>(png.width), height = static_cast<int>(png.height);
-    Image rgba{width, height, std::vector<std::uint8_t>(bytes_of(width, height, 4))};
-    if (!png_image_finish_read(&png, nullptr, rgba.rgb.data(), 0, nullptr)) {
-        const std::string why = png.message;
-        // Rows that were read are there, up to the last one; those of an interlaced image have holes.
-        const double missing = is_interlaced ? 1 : share_missing(rgba, 4, {width, 1}, 0);
-        auto said = damage_of("PNG", missing, why);
-        if (!said) return tl::unexpected(said.error());
-        if (damage && missing > 0) *damage = std::move(*said);
-    }
-    png_image_free(&png);
-    return without_alpha(width, height, std::move(rgba.rgb));
-}
-
-struct Destroy {
-    void operator()(void* handle) const { tjDestroy(handle); }
-};
-using TurboJpeg = std::unique_ptr<void, Destroy>;
-
 bool is_webp(std::span<const std::uint8_t> bytes) {
     return bytes.size() >= 12 && std::memcmp(bytes.data(), "RIFF", 4) == 0 &&
            std::memcmp(bytes.data() + 8, "WEBP", 4) == 0;
-}
-
-Result<Image> read_webp(std::span<const std::uint8_t> bytes, int largest_side) {
-    WebPBitstreamFeatures features;
-    if (WebPGetFeatures(bytes.data(), bytes.size(), &features) != VP8_STATUS_OK)
-        return damaged_image("WebP", "its header cannot be read");
-    if (auto ok = check_image_size(static_cast<std::uint64_t>(features.width),
-                                   static_cast<std::uint64_t>(features.height), largest_side);
-        !ok)
-        return tl::unexpected(ok.error());
-    if (features.has_animation) return image_not_read("is an animation");
-    std::vector<std::uint8_t> rgba(bytes_of(features.width, features.height, 4));
-    if (!WebPDecodeRGBAInto(bytes.data(), bytes.size(), rgba.data(), rgba.size(), 4 * features.width))
-        return damaged_image("WebP", "its pixels cannot be read");
-    return without_alpha(features.width, features.height, std::move(rgba));
 }
 
 }  // namespace
@@ -154,9 +95,9 @@ Result<Image> read_webp(std::span<const std::uint8_t> bytes, int largest_side) {
 Result<Image> read_image(std::span<const std::uint8_t> bytes, int largest_side, std::string* damage) {
     constexpr std::uint8_t jpeg_begins[] = {0xff, 0xd8, 0xff};
     if (damage) damage->clear();
-    if (begins_with(bytes, png_signature)) return read_png(bytes, largest_side, damage);
+    if (begins_with(bytes, png_signature)) return read_png_image(bytes, largest_side, damage);
     if (begins_with(bytes, jpeg_begins)) return read_jpeg_image(bytes, largest_side, damage);
-    if (is_webp(bytes)) return read_webp(bytes, largest_side);
+    if (is_webp(bytes)) return read_webp_image(bytes, largest_side);
     if (is_dds(bytes)) return read_dds_image(bytes, largest_side);
     if (is_bmp(bytes)) return read_bmp_image(bytes, largest_side);
     if (bytes.empty()) return fail(ErrorKind::bad_input, "the image is empty; save it or copy it again");
@@ -173,36 +114,6 @@ Result<Image> read_image_file(const std::filesystem::path& path, int largest_sid
     auto image = read_image(*bytes, largest_side, damage);
     if (!image) return fail(image.error().kind, path.string() + ": " + image.error().message);
     return image;
-}
-
-Result<std::vector<std::uint8_t>> write_png_image(const Image& image) {
-    png_image png;
-    std::memset(&png, 0, sizeof png);
-    png.version = PNG_IMAGE_VERSION;
-    png.width = static_cast<png_uint_32>(image.width);
-    png.height = static_cast<png_uint_32>(image.height);
-    png.format = PNG_FORMAT_RGB;
-    png.flags = PNG_IMAGE_FLAG_FAST;
-    std::vector<std::uint8_t> out(PNG_IMAGE_PNG_SIZE_MAX(png));
-    png_alloc_size_t size = out.size();
-    if (!png_image_write_to_memory(&png, out.data(), &size, 0, image.rgb.data(), 0, nullptr))
-        return fail(ErrorKind::bad_input, "the image cannot be written: " + std::string(png.message));
-    out.resize(size);
-    return out;
-}
-
-Result<std::vector<std::uint8_t>> write_jpeg_image(const Image& image, int quality) {
-    const TurboJpeg jpeg(tjInitCompress());
-    std::vector<std::uint8_t> out(tjBufSize(image.width, image.height, TJSAMP_420));
-    unsigned long size = static_cast<unsigned long>(out.size());
-    unsigned char* to = out.data();
-    if (!jpeg || tjCompress2(jpeg.get(), image.rgb.data(), image.width, 3 * image.width, image.height, TJPF_RGB, &to,
-                             &size, TJSAMP_420, quality, TJFLAG_ACCURATEDCT | TJFLAG_NOREALLOC) != 0)
-        return fail(ErrorKind::bad_input,
-                    "the image cannot be written: " +
-                        std::string(jpeg ? tjGetErrorStr2(jpeg.get()) : "there is no memory for it"));
-    out.resize(size);
-    return out;
 }
 
 }  // namespace htvm

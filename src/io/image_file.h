@@ -59,6 +59,8 @@ struct BlockSize {
 double share_missing(const Image& image, std::size_t channels, const BlockSize& block, std::uint8_t level);
 // What `damage` says of an image that lacks so much. Fails (bad_input) if that is more than half.
 Result<std::string> damage_of(const char* format, double missing, const std::string& why);
+// Leaves out the fourth channel, in place: of a large image there is no room for two.
+Image without_alpha(int width, int height, std::vector<std::uint8_t> rgba);
 
 }  // namespace internal
 }  // namespace htvm

@@ -10,7 +10,8 @@
 
 #include "io/image_file.h"
 
-namespace htvm::internal {
+namespace htvm {
+namespace internal {
 
 namespace {
 
@@ -93,4 +94,20 @@ Result<Image> read_jpeg_image(std::span<const std::uint8_t> bytes, int largest_s
     return out;
 }
 
-}  // namespace htvm::internal
+}  // namespace internal
+
+Result<std::vector<std::uint8_t>> write_jpeg_image(const Image& image, int quality) {
+    const internal::TurboJpeg jpeg(tjInitCompress());
+    std::vector<std::uint8_t> out(tjBufSize(image.width, image.height, TJSAMP_420));
+    unsigned long size = static_cast<unsigned long>(out.size());
+    unsigned char* to = out.data();
+    if (!jpeg || tjCompress2(jpeg.get(), image.rgb.data(), image.width, 3 * image.width, image.height, TJPF_RGB, &to,
+                             &size, TJSAMP_420, quality, TJFLAG_ACCURATEDCT | TJFLAG_NOREALLOC) != 0)
+        return fail(ErrorKind::bad_input,
+                    "the image cannot be written: " +
+                        std::string(jpeg ? tjGetErrorStr2(jpeg.get()) : "there is no memory for it"));
+    out.resize(size);
+    return out;
+}
+
+}  // namespace htvm

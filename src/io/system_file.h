@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 
 namespace htvm {
 
@@ -18,6 +19,9 @@ bool replace_file(const std::filesystem::path& from, const std::filesystem::path
 // Where root replaces somebody's file, it stays theirs: a service that reads it again may not read root's. Windows does
 // so by itself.
 void keep_owner(const std::filesystem::path& from, const std::filesystem::path& to);
+
+// Makes a folder that nobody had yet and nobody else can look into; its name is this with some letters behind it.
+std::optional<std::filesystem::path> make_own_folder(const std::filesystem::path& begin);
 
 // Whether a write failed because there is no room.
 bool is_disk_full(int reason);

@@ -133,11 +133,6 @@ private:
     std::FILE* said_ = nullptr;  // its errors
 };
 
-bool is_video_file_name(const fs::path& path) {
-    const auto extension = internal::lower_case(path.extension().string());
-    return std::ranges::find(video_extensions, extension) != std::end(video_extensions);
-}
-
 Result<TextureVideo> TextureVideo::open(const fs::path& path, const std::string& ffmpeg) {
     TextureVideo out;
     out.path_ = path;

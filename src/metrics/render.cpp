@@ -1,7 +1,5 @@
 #include "metrics/render.h"
 
-#include <png.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -291,19 +289,6 @@ Picture side_by_side(const std::vector<Picture>& pictures) {
         left += own;
     }
     return out;
-}
-
-Result<void> write_png(const Picture& picture, const std::string& path) {
-    png_image image;
-    std::memset(&image, 0, sizeof image);
-    image.version = PNG_IMAGE_VERSION;
-    image.width = static_cast<png_uint_32>(picture.width);
-    image.height = static_cast<png_uint_32>(picture.height);
-    image.format = PNG_FORMAT_RGB;
-    image.flags = PNG_IMAGE_FLAG_FAST;
-    if (!png_image_write_to_file(&image, path.c_str(), 0, picture.rgb.data(), 0, nullptr))
-        return fail(ErrorKind::bad_input, "Cannot write the picture " + path + ": " + image.message + ".");
-    return {};
 }
 
 }  // namespace htvm

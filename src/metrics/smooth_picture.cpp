@@ -1,7 +1,5 @@
 #include "metrics/smooth_picture.h"
 
-#include <png.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -87,29 +85,6 @@ std::vector<std::uint8_t> on_background(const SmoothPicture& picture, const Colo
                                  ? rgba[c]
                                  : level_of(share * light_of(rgba[c]) + (1 - share) * light_of(background[c]));
     }
-    return out;
-}
-
-Result<std::vector<std::uint8_t>> png_of(const SmoothPicture& picture, const std::optional<Colour>& background) {
-    const auto pixels = background ? on_background(picture, *background) : picture.rgba;
-    png_image image;
-    std::memset(&image, 0, sizeof image);
-    image.version = PNG_IMAGE_VERSION;
-    image.width = static_cast<png_uint_32>(picture.width);
-    image.height = static_cast<png_uint_32>(picture.height);
-    image.format = background ? PNG_FORMAT_RGB : PNG_FORMAT_RGBA;
-    png_alloc_size_t size = 0;
-    std::vector<std::uint8_t> out;
-    const auto write = [&](void* to) {
-        return png_image_write_to_memory(&image, to, &size, 0, pixels.data(), 0, nullptr) != 0;
-    };
-    bool written = write(nullptr);
-    if (written) {
-        out.resize(size);
-        written = write(out.data());
-    }
-    if (!written) return fail(ErrorKind::bad_input, "the picture cannot be made: " + std::string(image.message));
-    out.resize(size);
     return out;
 }
 

@@ -1,6 +1,7 @@
-// Closest points on a mesh's surface. A bounding volume hierarchy (Embree's) finds the candidates; distances are
-// computed in double. The hierarchy works in float, so it is searched slightly wider than needed to allow for its
-// rounding. The result is thus exactly the smallest double distance, whatever the hierarchy looks like.
+// Closest points on a mesh's surface. A bounding volume hierarchy (Embree's, or where that is left out, one of
+// triangle_index_own.cpp) finds the candidates; distances are computed in double. The hierarchy may work in float, so
+// it is searched slightly wider than needed to allow for its rounding. The result is thus exactly the smallest double
+// distance, whatever the hierarchy looks like.
 #pragma once
 
 #include <cstdint>

@@ -218,11 +218,6 @@ Result<OpusTrack> coded_again(LaidSound& sound, int channels) {
 
 }  // namespace
 
-bool is_written_sound_name(const std::filesystem::path& path) {
-    const auto extension = extension_of(path);
-    return extension == ".wav" || extension == ".opus" || extension == ".ogg" || extension == ".oga";
-}
-
 Result<SoundFileSummary> write_stream_sound(const std::filesystem::path& path, std::vector<SoundPiece> pieces,
                                             std::int64_t end) {
     const auto failed = [&](ErrorKind kind, const std::string& what) {

@@ -64,11 +64,12 @@ FLOORS = [
     ("src/container", ["core", "codec/format", "htvm/decoder.hpp"]),
     ("src/synth", ["core"]),
     ("src/metrics", ["core"]),
+    ("src/live/files", ["core"]),
     ("src/live/client", [*LIVE, "htvm/decoder.hpp", "htvm/publisher.hpp", "htvm/watcher.hpp"]),
     ("src/c_api/c_live.cpp",
      ["core", "c_api", "htvm/publisher.hpp", "htvm/watcher.hpp", "htvm/htvm.h", "htvm/htvm_live.h"]),
     ("src/live/hub", [*LIVE, "live/client"]),
-    ("src/live/server", [*LIVE, "io", "container", "live/client", "live/hub"]),
+    ("src/live/server", [*LIVE, "io", "container", "live/files", "live/client", "live/hub"]),
 ]
 # The programs stand above everything.
 LIBRARIES = [folder.removeprefix("src/") for folder, _ in FLOORS if folder.startswith("src/")]

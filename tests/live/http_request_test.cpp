@@ -1,5 +1,5 @@
 // What is parsed of a request: no path leads out of the folder, and ranges are those of RFC 9110.
-#include "live/server/http_request.h"
+#include "live/files/http_request.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "live/server/player_files.h"
+#include "live/files/player_files.h"
 #include "live/server/server.h"
 #include "server_test.h"
 

@@ -1,5 +1,5 @@
 // Which handler a request is for.
-#include "live/server/routing.h"
+#include "live/files/routing.h"
 
 #include <gtest/gtest.h>
 

@@ -11,7 +11,8 @@ case $platform in
     aarch64) exec qemu-aarch64-static -L "${HTVM_EMULATED_ROOT:-/usr/aarch64-linux-gnu}" "$program" "$@" ;;
     windows)
         mkdir -p "$project/build"
-        export WINEPREFIX=$project/build/wine WINEDEBUG=-all
+        # Wine takes the words of a command by this system's language.
+        export WINEPREFIX=$project/build/wine WINEDEBUG=-all LC_ALL=C.UTF-8
         [ -f "$program" ] || program=$program.exe
         # Debian's package wine64 alone puts nothing into the PATH.
         wine=$(command -v wine64 || echo /usr/lib/wine/wine64)

@@ -1,10 +1,12 @@
 #!/usr/bin/env bash
 # The decoder, the encoder and the C library, built by CMake for other processors and systems and run here by qemu and
-# Wine. Prints a line for each thing that was tried; fails unless all are well.
-#   tests/platforms/run.sh [--tests[=FLOOR,...]] [--program] [PLATFORM...]   PLATFORM: aarch64, windows; default both
+# Wine; htvm.exe; and htvm with the same left out for this machine ("reduced"). Prints a line for each thing that was
+# tried; fails unless all are well.
+#   tests/platforms/run.sh [--tests[=FLOOR,...]] [--program] [PLATFORM...]   PLATFORM: aarch64, windows, reduced; default
+# all
 # --tests also runs the tests of the floors named, by default of all that the libraries are made of; the codec's take an
 # hour on two cores. GTEST_FILTER chooses among them.
-# --program builds htvm as well, for 64-bit ARM, and tries it beside this machine's own build/release/htvm (program.sh).
+# --program builds htvm for 64-bit ARM, too, and tries it beside this machine's own build/release/htvm (program.sh).
 # HTVM_ENCODED names this machine's own `encoded` (tests/digests/encoded.cpp), build/release/encoded if it does not.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -18,7 +20,7 @@ for word in "$@"; do
         *) platforms+=("$word") ;;
     esac
 done
-[ ${#platforms[@]} -gt 0 ] || platforms=(aarch64 windows)
+[ ${#platforms[@]} -gt 0 ] || platforms=(aarch64 windows reduced)
 streams=tests/data/conformance
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -37,7 +39,7 @@ failed() {
 encoded=(tracked_4 person_2 charts_6 presence_7)
 encoded=("${encoded[@]/%/.htvm}")
 encoded=("${encoded[@]/#/$streams/}")
-"${HTVM_ENCODED:-build/release/encoded}" "${encoded[@]}" >"$work/here"
+[ "${platforms[*]}" = reduced ] || "${HTVM_ENCODED:-build/release/encoded}" "${encoded[@]}" >"$work/here"
 
 # exports LIBRARY: the names that it gives to programs.
 exports() {
@@ -45,6 +47,20 @@ exports() {
         *.dll) x86_64-w64-mingw32-objdump -p "$1" | awk '/\[Ordinal\/Name Pointer\]/ { on = 1; next } on && /\[/ { print $NF } !NF { on = 0 }' ;;
         *) aarch64-linux-gnu-nm -D --defined-only "$1" | awk '{ print $3 }' ;;
     esac | LC_ALL=C sort
+}
+
+try_program() {
+    if tests/platforms/program.sh "$1" >"$work/log" 2>&1; then
+        said "$1" "htvm itself" "$(tail -1 "$work/log")"
+    else
+        failed "$1" "htvm itself"
+    fi
+}
+
+try_reduced() {
+    { tests/platforms/configure.sh reduced && cmake --build build/reduced --target htvm; } >"$work/log" 2>&1 ||
+        { failed reduced "build"; return; }
+    try_program reduced
 }
 
 try() {
@@ -56,6 +72,7 @@ try() {
         export HTVM_EMULATED_ROOT=${HTVM_AARCH64_ROOT:-$PWD/build/aarch64_root}
     else
         unset HTVM_EMULATED_ROOT
+        [ "$platform" != windows ] || targets+=(htvm)
     fi
     { tests/platforms/configure.sh "$platform" "${options[@]}" && cmake --build "$build" --target "${targets[@]}"; } >"$work/log" 2>&1 ||
         { failed "$platform" "build"; return; }
@@ -89,13 +106,7 @@ try() {
     else
         failed "$platform" "Python wheel"
     fi
-    if [ ${#options[@]} -gt 0 ]; then
-        if tests/platforms/program.sh "$platform" >"$work/log" 2>&1; then
-            said "$platform" "htvm itself" "$(tail -1 "$work/log")"
-        else
-            failed "$platform" "htvm itself"
-        fi
-    fi
+    if [ ${#options[@]} -gt 0 ] || [ "$platform" = windows ]; then try_program "$platform"; fi
     for floor in "${floors[@]}"; do
         if "${emulate[@]}" "$build/test_$floor" --gtest_brief=1 >"$work/log" 2>&1; then
             said "$platform" "tests of $floor" "$(tail -1 "$work/log")"
@@ -105,6 +116,8 @@ try() {
     done
 }
 
-for platform in "${platforms[@]}"; do try "$platform"; done
+for platform in "${platforms[@]}"; do
+    if [ "$platform" = reduced ]; then try_reduced; else try "$platform"; fi
+done
 [ $failures -eq 0 ] || { echo "FAILED: $failures"; exit 1; }
 echo "All is well."

@@ -14,12 +14,12 @@ struct MeshCounts {
 
 // The most memory, bytes, that meshes of so many vertices and triangles take, with all attributes, of any
 // connectivity: about half as much again as was measured of the worst (tests/memory).
-std::uint64_t memory_of_reference(MeshCounts mesh);      // what an I-frame leaves for the frames that refer to it
-std::uint64_t memory_of_charts(MeshCounts mesh);         // what charts add to it
-std::uint64_t memory_of_tracking(MeshCounts mesh);       // what T-frames add to it
-std::uint64_t memory_of_tracked_frame(MeshCounts mesh);  // one that is kept for others of its group
-std::uint64_t memory_of_presence(MeshCounts mesh);       // what telling what is there adds to tracking
-inline constexpr std::uint64_t memory_of_detail_vertex = 1024;  // of the levels below a reference, and while shown
+std::uint64_t memory_of_reference(MeshCounts mesh);            // what an I-frame leaves for the frames that refer to it
+std::uint64_t memory_of_charts(MeshCounts mesh);               // what charts add to it
+std::uint64_t memory_of_tracking(MeshCounts mesh);             // what T-frames add to it
+std::uint64_t memory_of_tracked_frame(MeshCounts mesh);        // one that is kept for others of its group
+std::uint64_t memory_of_presence(MeshCounts mesh);             // what telling what is there adds to tracking
+inline constexpr std::uint64_t memory_of_detail_vertex = 512;  // of the levels below a reference, and while shown
 
 // What decoding a frame of some kind takes besides, the frame itself included; in frame_kinds.cpp for each kind.
 struct MemoryBound {

@@ -117,17 +117,11 @@ std::optional<AddressCounts::Place> Admission::admit_behind_proxy(const Address&
     return AddressCounts::Place(behind_proxies_, address);
 }
 
-bool Admission::names_loopback(std::string_view host) const {
-    const auto suffix = ':' + std::to_string(port_);
-    if (host.ends_with(suffix)) host.remove_suffix(suffix.size());
-    return host == "127.0.0.1" || host == "localhost" || host == "[::1]";
-}
-
 // A page of another site whose name was made to point here (DNS rebinding) sends that name.
 bool Admission::host_allowed(const Request& request) const {
     if (!options_.loopback_names && options_.hosts.empty()) return true;
     const auto host = request[http::field::host];
-    if (names_loopback(host)) return true;
+    if (names_loopback(host, port_)) return true;
     const auto named = [&](const std::string& name) { return same_host(host_without_port(host), name); };
     return std::any_of(options_.hosts.begin(), options_.hosts.end(), named);
 }
@@ -144,7 +138,7 @@ bool Admission::origin_allowed(const Request& request) const {
 // through a web server here.
 bool Admission::by_program_here(const Request& request, const Client& client) const {
     const auto origin = request[http::field::origin];
-    const bool page_elsewhere = !origin.empty() && !names_loopback(host_of_origin(origin));
+    const bool page_elsewhere = !origin.empty() && !names_loopback(host_of_origin(origin), port_);
     const bool forwarded = request.count("Forwarded") || request.count("X-Forwarded-For") || request.count("Via");
     return counted_address(client.address).is_loopback() && !client.by_proxy && !page_elsewhere && !forwarded;
 }

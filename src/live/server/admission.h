@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "htvm/result.hpp"
+#include "live/files/http_request.h"
+#include "live/files/response.h"
 #include "live/server/credentials.h"
-#include "live/server/http_request.h"
 #include "live/server/refusals.h"
-#include "live/server/response.h"
 #include "live/server/revocations.h"
 #include "live/server/trusted_proxies.h"
 #include "live/server/web_token.h"
@@ -145,7 +145,6 @@ public:
 
 private:
     std::optional<Refusal> refuse_link(const std::string& path, std::string_view target) const;
-    bool names_loopback(std::string_view host) const;
     bool by_program_here(const Request& request, const Client& client) const;
     bool origin_allowed(const Request& request) const;
     bool asks_for_links() const { return credentials_.link_keys.has_value(); }

@@ -22,7 +22,7 @@
 
 #include "core/letter_case.h"
 #include "live/client/line.h"
-#include "live/server/http_request.h"
+#include "live/files/http_request.h"
 
 namespace htvm::live {
 namespace {

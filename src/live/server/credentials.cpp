@@ -14,9 +14,9 @@
 #include <optional>
 #include <span>
 
+#include "live/files/http_request.h"
 #include "live/hub/stream_name.h"
 #include "live/server/access_file.h"
-#include "live/server/http_request.h"
 
 namespace htvm::live {
 namespace {

@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "live/client/control.h"
+#include "live/files/file_answers.h"
+#include "live/files/response_sending.h"
 #include "live/hub/stream_name.h"
 #include "live/server/live_connection.h"
 #include "live/server/metrics.h"
@@ -26,28 +28,13 @@ namespace http = boost::beast::http;
 constexpr auto awaited = net::as_tuple(net::use_awaitable);
 constexpr const char *json_type = "application/json", *plain_text = "text/plain; charset=utf-8";
 
-// What every response has.
 ResponseHeader common_header(const Site& site) {
-    ResponseHeader header{http::status::ok, 11};
-    header.set("X-Content-Type-Options", "nosniff");
-    header.set("Referrer-Policy", "no-referrer");
-    header.set("Cross-Origin-Resource-Policy", site.admission.has_other_sites() ? "cross-origin" : "same-origin");
-    return header;
+    return live::common_header(site.admission.has_other_sites() ? "cross-origin" : "same-origin");
 }
 
-// Names of files and streams may be any bytes.
+// Names of streams may be any bytes.
 std::string json_text(const nlohmann::json& json) {
     return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-std::string file_list(const ServedFiles& files) {
-    nlohmann::json list = nlohmann::json::array();
-    for (const auto& file : files.list()) {
-        nlohmann::json entry = {{"path", file.path}, {"bytes", file.size}};
-        if (!file.poster.empty()) entry["poster"] = file.poster;
-        list.push_back(std::move(entry));
-    }
-    return json_text(list);
 }
 
 std::string stream_list(const Hub& hub) {
@@ -102,34 +89,7 @@ Response answer_file(const Site& site, const std::vector<std::string>& segments,
         site.refusals.count(refusal->cause);
         return refusing_response(*refusal, std::move(header));
     }
-    auto file = site.files.file(segments);
-    if (!file) return empty_response(http::status::not_found, std::move(header));
-    header.set(http::field::etag, file->tag);
-    header.set(http::field::accept_ranges, "bytes");
-    header.set(http::field::cache_control, "no-cache");  // kept, but asked for again whether it is still the same
-    if (names_tag(request[http::field::if_none_match], file->tag))
-        return empty_response(http::status::not_modified, std::move(header));
-    const auto condition = request[http::field::if_range];
-    const bool ranges = condition.empty() || condition == file->tag;
-    const auto part = requested_part(ranges ? request[http::field::range] : "", file->size);
-    if (part.kind == FilePart::Kind::beyond) {
-        header.set(http::field::content_range, "bytes */" + std::to_string(file->size));
-        return empty_response(http::status::range_not_satisfiable, std::move(header));
-    }
-    if (part.kind == FilePart::Kind::part) {
-        header.result(http::status::partial_content);
-        header.set(http::field::content_range, "bytes " + std::to_string(part.first) + '-' +
-                                                   std::to_string(part.first + part.count - 1) + '/' +
-                                                   std::to_string(file->size));
-    }
-    header.set(http::field::content_type, media_type(segments.back()));
-    return {.header = std::move(header), .file = std::move(*file), .first = part.first, .count = part.count};
-}
-
-Response answer_page(const Site& site, const std::string& name, const Request& request, ResponseHeader header) {
-    const auto found = site.pages.find(name);
-    if (found == site.pages.end()) return empty_response(http::status::not_found, std::move(header));
-    return page_response(found->second, request, std::move(header));
+    return file_response(site.files, segments, request, std::move(header));
 }
 
 Response answer_readiness(const Site& site, ResponseHeader header) {
@@ -236,16 +196,13 @@ net::awaitable<Response> answer(const Site& site, const Route& route, const Requ
         co_return empty_response(http::status::misdirected_request, std::move(header));
     switch (route.handler) {
         case Handler::wrong_method:
-            header.set(http::field::allow, "GET, HEAD");
-            co_return empty_response(http::status::method_not_allowed, std::move(header));
+            co_return wrong_method_response(std::move(header));
         case Handler::bad_path:
-            co_return refusing_response(
-                {"path", "a path here has no part that is empty or begins with '.'", http::status::bad_request},
-                std::move(header));
+            co_return bad_path_response(std::move(header));
         case Handler::page:
-            co_return answer_page(site, "index.html", request, std::move(header));
+            co_return page_response(site.pages, "index.html", request, std::move(header));
         case Handler::player_file:
-            co_return answer_page(site, route.name, request, std::move(header));
+            co_return page_response(site.pages, route.name, request, std::move(header));
         case Handler::file:
             co_return answer_file(site, route.path, request, std::move(header));
         case Handler::file_list:

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "live/files/response_sending.h"
+
 namespace htvm::live {
 
 namespace net = boost::asio;

@@ -10,9 +10,9 @@
 
 #include "live/client/control.h"
 #include "live/client/line.h"
+#include "live/files/http_request.h"
+#include "live/files/response.h"
 #include "live/hub/hub.h"
-#include "live/server/http_request.h"
-#include "live/server/response.h"
 
 namespace htvm::live {
 

@@ -6,6 +6,10 @@ namespace htvm::live {
 
 constexpr std::uint64_t most_logged = 10;  // a second
 
+Response refusing_response(const Refusal& refusal, ResponseHeader header) {
+    return sentence_response(refusal.status, refusal.why, std::move(header));
+}
+
 void Refusals::tell(const Refusal& refusal, const std::string& stream, const boost::asio::ip::address& address) {
     count(refusal.cause);
     if (++in_second_ > most_logged || !log_) return;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "live/client/control.h"
+#include "live/files/response.h"
 #include "live/hub/event.h"
 
 namespace htvm::live {
@@ -23,6 +24,8 @@ struct Refusal {
     std::chrono::seconds delay{};         // before it is said
     bool may_be_asked = false;            // the authority may say otherwise (live/server/authority.h)
 };
+// The sentence that says why.
+Response refusing_response(const Refusal& refusal, ResponseHeader header);
 
 class Refusals {
 public:

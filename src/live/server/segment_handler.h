@@ -17,8 +17,8 @@
 #include <string>
 #include <vector>
 
-#include "live/server/http_request.h"
-#include "live/server/response.h"
+#include "live/files/http_request.h"
+#include "live/files/response.h"
 
 namespace htvm::live {
 

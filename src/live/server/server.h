@@ -1,6 +1,5 @@
-// The web server of `htvm serve` and `htvm play`: the player's page, files of streams, and, with a hub, live streams.
-// It is for a person's own browser on the loopback address, and for what others may watch. Which path leads where is
-// told in live/server/routing.h.
+// The web server of `htvm serve`: the player's page, files of streams, and, with a hub, live streams. Which path leads
+// where is told in live/files/routing.h. That of `htvm play`, for a person's own browser, is live/files/local_server.h.
 //
 // The parts, each with a state of its own, which no other reaches into:
 //
@@ -27,11 +26,11 @@
 #include <vector>
 
 #include "htvm/result.hpp"
+#include "live/files/served_files.h"
 #include "live/hub/hub.h"
 #include "live/hub/nats_peering.h"
 #include "live/server/admission.h"
 #include "live/server/authority.h"
-#include "live/server/served_files.h"
 
 namespace htvm::live {
 

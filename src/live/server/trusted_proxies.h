@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "htvm/result.hpp"
-#include "live/server/http_request.h"
+#include "live/files/http_request.h"
 
 namespace htvm::live {
 

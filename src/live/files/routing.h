@@ -25,7 +25,7 @@
 #include <string>
 #include <vector>
 
-#include "live/server/http_request.h"
+#include "live/files/http_request.h"
 
 namespace htvm::live {
 

@@ -1,4 +1,4 @@
-#include "live/server/routing.h"
+#include "live/files/routing.h"
 
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <utility>

@@ -44,7 +44,7 @@ public:
     // bad_input if there is no such folder.
     static Result<ServedFolder> open(const std::string& path);
 
-    // The regular file that these segments (live/server/http_request.h) name. bad_input if there is none. Symbolic
+    // The regular file that these segments (live/files/http_request.h) name. bad_input if there is none. Symbolic
     // links are not followed, at any segment, so that no file outside of the folder is reached however it changes
     // meanwhile.
     Result<ServedFile> file(std::span<const std::string> segments) const;

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "live/server/http_request.h"
-#include "live/server/response.h"
+#include "live/files/http_request.h"
+#include "live/files/response.h"
 
 namespace htvm::live {
 

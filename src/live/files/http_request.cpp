@@ -1,4 +1,4 @@
-#include "live/server/http_request.h"
+#include "live/files/http_request.h"
 
 #include <algorithm>
 #include <charconv>
@@ -117,6 +117,12 @@ std::string_view host_of_origin(std::string_view origin) {
     constexpr std::string_view after_scheme = "://";
     const auto found = origin.find(after_scheme);
     return found == std::string_view::npos ? "" : origin.substr(found + after_scheme.size());
+}
+
+bool names_loopback(std::string_view host, std::uint16_t port) {
+    const auto suffix = ':' + std::to_string(port);
+    if (host.ends_with(suffix)) host.remove_suffix(suffix.size());
+    return host == "127.0.0.1" || host == "localhost" || host == "[::1]";
 }
 
 bool accepts_gzip(std::string_view header) {

@@ -1,11 +1,11 @@
-#include "live/server/player_pages.h"
+#include "live/files/player_pages.h"
 
 #include <boost/beast/zlib/deflate_stream.hpp>
 #include <cstdint>
 #include <utility>
 
 #include "core/crc32.h"
-#include "live/server/player_files.h"
+#include "live/files/player_files.h"
 
 namespace htvm::live {
 namespace {

@@ -46,6 +46,10 @@ bool names_tag(std::string_view list, std::string_view tag);
 // none, such as "null".
 std::string_view host_of_origin(std::string_view origin);
 
+// Whether a Host header names this machine's loopback address, with this port or none. A page of another site whose
+// name was made to lead here (DNS rebinding) sends that name.
+bool names_loopback(std::string_view host, std::uint16_t port);
+
 // Whether an Accept-Encoding header allows gzip.
 bool accepts_gzip(std::string_view header);
 
