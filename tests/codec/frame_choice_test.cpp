@@ -6,6 +6,7 @@
 
 #include "codec/encoder/bones/scene_change.h"
 #include "codec/enhanced_options.h"
+#include "codec/patched_sequences.h"
 #include "codec/test_sequences.h"
 #include "codec/without_reason.h"
 #include "surface/surface_distance.h"
@@ -28,12 +29,6 @@ TestSequence carried(const std::vector<double>& places) {
         for (auto& joint : frame.pose->joints) joint[0] += x;
         out.frames.push_back(std::move(frame));
     }
-    return out;
-}
-
-std::vector<FrameType> types_of(const CodedSequence& coded) {
-    std::vector<FrameType> out;
-    for (const auto& info : coded.infos) out.push_back(info.type);
     return out;
 }
 

@@ -14,12 +14,6 @@ namespace {
 
 using namespace test;
 
-std::vector<FrameType> types_of(const CodedSequence& coded) {
-    std::vector<FrameType> out;
-    for (const auto& info : coded.infos) out.push_back(info.type);
-    return out;
-}
-
 constexpr auto I = FrameType::intra, T = FrameType::tracked, TP = FrameType::patched;
 
 TEST(PatchedFrames, ComeWhereARegionIsLostInsteadOfIFrames) {

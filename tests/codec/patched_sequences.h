@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <vector>
 
 #include "codec/ball.h"
 #include "codec/enhanced_options.h"
@@ -29,6 +30,12 @@ inline TestSequence horned_ball(int frames, int lost = 2, double horn = 150, dou
         out.frames.push_back(std::move(frame));
     }
     return meshed_anew(std::move(out));
+}
+
+inline std::vector<FrameType> types_of(const CodedSequence& coded) {
+    std::vector<FrameType> out;
+    for (const auto& info : coded.infos) out.push_back(info.type);
+    return out;
 }
 
 inline EncoderOptions patched_options() {

@@ -76,6 +76,15 @@ struct TrackingNumbers {
     int forgotten_after = 150;    // frames for which a vertex was not seen: the next I-frame leaves it out
     double most_grown = 2.5;      // as most_renewed_vertices, where the reference grows with what is seen
 
+    // ---- When T-frames follow the reference worse and worse: see fresh_reference.h
+    std::uint32_t followed_every = 4;      // of so many frames one is measured
+    std::uint32_t least_served = 16;       // frames behind an I-frame before another one may be worth it
+    double most_served = 60;               // frames that one is expected to serve: as many as the last, but these
+    double later_error = 1.1;              // of its T-frames on average, in times of that of the one that is tried
+    double least_saved = 0.3;              // of the price of these frames, as a logarithm
+    std::uint32_t tried_again_after = 30;  // frames,
+    double tried_again_from = 1.3;         // or from this many times the error
+
     // ---- When an I-frame is sent
     double most_others = 0.1;  // share of the vertices that have other texture coordinates: the atlas is laid out anew
     double most_renewed_vertices = 1.3;  // of the tracked mesh, in times those of the last I-frame made of the capture:

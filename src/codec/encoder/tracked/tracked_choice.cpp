@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "codec/encoder/tracked/fresh_reference.h"
 #include "codec/encoder/tracked/surface_patch.h"
 #include "codec/encoder/tracked/texcoord_layout.h"
 #include "codec/encoder/tracked/tracked_coders.h"
@@ -294,10 +295,12 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     const bool due = intra_is_due(work);
     const auto& history = work.sequence.history;
     auto in_vain = history.in_vain;
+    auto followed = history.followed;
     const auto send = [&](CodedMotion coded, LatticeUnits best, std::optional<FrameReason> to_patch = {}) {
         auto out = chosen_motion(work, *tracking.registered, std::move(coded), best);
         out.history.to_patch = to_patch;
         out.history.in_vain = in_vain;
+        out.history.followed = followed;
         return Frame(std::move(out));
     };
     // 1. Its motion alone, where no more is wanted.
@@ -344,7 +347,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         if (auto ok = look_for_limbs(work, tracking, steps, patches, *motion); !ok) return tl::unexpected(ok.error());
     }
 
-    // 5. Where it still is: a patch.
+    // 5. Where it still is: a patch, or an I-frame that lets the frames behind it follow better.
     const auto& tracked = motion->coded.encoded;
     const auto anew = why_anew(work, motion->coded);
     if (!anew && patches && motion->lost) {
@@ -352,16 +355,26 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
             patch(work, *tracking.registered, steps, motion->to_patch(), why_patched(*motion->lost), Replaced::all);
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) {
-            (*patched)->in_vain = in_vain;
-            return Frame(std::move(**patched));
+            auto& sent = **patched;
+            auto fresh =
+                fresh_reference(work, {sent.frame.decoded, sent.frame.detail, motion->coded.bytes()}, steps, followed);
+            if (!fresh) return tl::unexpected(fresh.error());
+            if (*fresh) return Frame(std::move(**fresh));
+            sent.in_vain = in_vain;
+            sent.followed = followed;
+            return Frame(std::move(sent));
         }
     }
 
-    // 6. The T-frame, or an I-frame: of the tracked mesh, where that is as good.
+    // 6. The T-frame, or an I-frame: of the tracked mesh, where that is as good; or where its T-frames will be nearer.
     const bool best = !motion->lost && (history.best_fit.value == 0 || motion->fit.rms < history.best_fit);
     const auto best_fit = best ? motion->fit.rms : history.best_fit;
     const auto reason = why_intra(work, due, motion->lost, anew);
     if (!reason) {
+        auto fresh = fresh_reference(work, {tracked.mesh, work.reference->decoded.detail, motion->coded.bytes()}, steps,
+                                     followed);
+        if (!fresh) return tl::unexpected(fresh.error());
+        if (*fresh) return Frame(std::move(**fresh));
         const bool grows = growth_is_due(work, motion->fit, in_vain);
         return send(std::move(motion->coded), best_fit, grows ? std::optional(FrameReason::border) : std::nullopt);
     }

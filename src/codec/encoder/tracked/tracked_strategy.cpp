@@ -173,6 +173,7 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedPatch& patch) {
     out.history.targets = std::move(patch.targets);
     out.history.presence = std::move(patch.presence);
     out.history.in_vain = patch.in_vain;
+    out.history.followed = patch.followed;
     out.captured = vertices_of(work.captured);
     out.to_derive = {*reference, work.sequence.reference, std::move(patch.before_last), std::move(patch.last)};
     out.reference = std::move(*reference);

@@ -48,6 +48,22 @@ struct VainAttempts {
     std::optional<std::uint32_t> repair;  // patching what is lost, as the frame before had asked
 };
 
+// A captured mesh on which a new reference may be tried, without its attributes.
+struct MeasuredCapture {
+    LatticeMesh mesh;
+    std::shared_ptr<const SurfaceIndex> surface;
+    double error = 0;  // RMS distance between it and what was sent
+};
+
+// How far the frames since the I-frame were off, as far as they were measured: see fresh_reference.h.
+struct FollowedError {
+    std::shared_ptr<const MeasuredCapture> last;  // of the last frame that was measured; null: none was
+    double least = 0;                             // RMS distance between the surfaces; 0: of none yet
+    double tracked_bytes = 0;                     // of the T-frames since the I-frame
+    std::optional<std::uint32_t> tried;           // number of the last frame in whose place an I-frame was tried
+    double error_when_tried = 0;                  // of that frame
+};
+
 // What the T-frames since the reference leave for the next one.
 struct MotionHistory {
     std::optional<std::uint32_t> frame;          // number of the last one
@@ -62,6 +78,7 @@ struct MotionHistory {
     LatticeUnits best_fit;                // RMS of the best so far; 0: none yet
     std::optional<FrameReason> to_patch;  // why the next frame should be a TP-frame at once; nothing if it need not
     VainAttempts in_vain;
+    FollowedError followed;
 };
 
 // A captured mesh without its attributes: the next one may have kept its vertices.
@@ -128,6 +145,7 @@ struct TrackedPatch {
     std::vector<RigidMotion> before_last, last;  // of each node of the reference before, up to this frame
     LatticeUnits best_fit;                       // as of an I-frame
     VainAttempts in_vain;                        // as of a T-frame
+    FollowedError followed;                      // likewise
 };
 
 // The frame that is coded, and what is found of it before that. Attempts share it and leave it as it is.
