@@ -137,6 +137,8 @@ sed -n 's/: .*, reason /: /p' "$work/kinds" | cmp - "$work/reasons" || { echo "r
 python3 "$here/picture.py" "$here/../data/conformance/pictures_6.htvm" >"$work/pictures"
 cut -d' ' -f1-10 "$here/../data/conformance/pictures_6.pictures" | cmp - "$work/pictures" ||
     { echo "pictures_6: other pictures"; cat "$work/pictures"; exit 1; }
+python3 "$here/picture.py" "$here/../data/pictures_h264.htvm" | cmp - "$here/../data/pictures_h264.pictures" ||
+    { echo "pictures_h264: other pictures"; exit 1; }
 python3 "$here/awkward.py" "$work/awkward"
 for sequence in "$work"/awkward/*; do
     name=$(basename "$sequence")
