@@ -81,7 +81,7 @@ struct TrackingNumbers {
     std::uint32_t least_served = 16;       // frames behind an I-frame before another one may be worth it
     double most_served = 60;               // frames that one is expected to serve: as many as the last, but these
     double later_error = 1.1;              // of its T-frames on average, in times of that of the one that is tried
-    double least_saved = 0.3;              // of the price of these frames, as a logarithm
+    double least_saved = 0.4;              // of the price of these frames, as a logarithm
     std::uint32_t tried_again_after = 30;  // frames,
     double tried_again_from = 1.3;         // or from this many times the error
 

@@ -15,8 +15,9 @@ constexpr auto& numbers = tracking_numbers;
 // repaired by growing, and pictures on charts would begin anew too, which takes more bits than the I-frame.
 bool may_begin_anew(const TrackedWork& work) {
     const auto& rate = work.configuration.options.rate;
-    return rate.bits_per_second <= 0 && rate.target_error <= 0 && !work.captured.may_repair &&
-           !work.configuration.tells_presence() && work.configuration.options.texture.layout != TextureLayout::charts;
+    return work.effort.fresh_references && rate.bits_per_second <= 0 && rate.target_error <= 0 &&
+           !work.captured.may_repair && !work.configuration.tells_presence() &&
+           work.configuration.options.texture.layout != TextureLayout::charts;
 }
 
 // By how much an I-frame changes the price of the frames that it will serve, which may be as many as the last one has
