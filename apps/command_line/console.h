@@ -16,7 +16,7 @@ std::vector<std::string> given_words(int argc, char** argv);
 
 // Whether what is said on stderr is seen by somebody, and can be overwritten.
 bool errors_go_to_terminal();
-// Of the terminal that stdout is; 0: it is none.
+// How many columns the terminal has that stdout is; 0: it is none.
 std::size_t columns_of_output();
 
 // Reads what there is on standard input, or waits a tenth of a second for it: empty if nothing came. Nothing at its

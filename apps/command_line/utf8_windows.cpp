@@ -20,7 +20,8 @@ int length_of(unsigned char first) {
 
 extern "C" {
 
-// Of a letter beyond 16 bits the first half comes with three bytes; the second waits in the state for the fourth.
+// A letter beyond 16 bits is two halves: the first comes with three bytes, the second waits in the state for the
+// fourth.
 std::size_t mbrtowc(wchar_t* out, const char* text, std::size_t bytes, std::mbstate_t* state) {
     static std::mbstate_t own = 0;
     auto& waits = state ? *state : own;

@@ -42,8 +42,7 @@ public:
 private:
     struct Held {
         Packet packet;
-        // Of a picture that is being coded.
-        std::optional<TexturePicture> picture = {};
+        std::optional<TexturePicture> picture = {};  // that is being coded; none: the packet is another
     };
     Result<void> code(Held& held);
     Result<void> begin(std::uint32_t width, std::uint32_t height);
