@@ -30,13 +30,6 @@ struct TriangleIndex::Impl {
 
 namespace {
 
-double squared_distance_to(const Mesh& mesh, std::uint32_t triangle, const Point3& p) {
-    const auto& t = mesh.triangles[triangle];
-    return closest_on_triangle(p, to_point(mesh.positions[t[0]]), to_point(mesh.positions[t[1]]),
-                               to_point(mesh.positions[t[2]]))
-        .squared_distance;
-}
-
 // How far to search the hierarchy to be sure to find everything within `distance`: float coordinates, boxes and
 // distances are each off by a few units in the last place.
 float search_radius(double distance, double largest) {

@@ -20,6 +20,13 @@ inline Point3 closest_point_of(const Point3& p, const Point3& a, const Point3& b
     return internal::point_at(internal::closest_on_triangle(p, a, b, c).shares, a, b, c);
 }
 
+inline double squared_distance_to(const Mesh& mesh, std::uint32_t triangle, const Point3& p) {
+    const auto& t = mesh.triangles[triangle];
+    return internal::closest_on_triangle(p, to_point(mesh.positions[t[0]]), to_point(mesh.positions[t[1]]),
+                                         to_point(mesh.positions[t[2]]))
+        .squared_distance;
+}
+
 struct ClosestTriangle {
     double squared_distance = 0;  // mm^2
     std::uint32_t triangle = 0;   // of equally near ones, the lowest index

@@ -50,13 +50,6 @@ struct Node {
 
 double largest_component(const Point3& p) { return std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])}); }
 
-double squared_distance_to(const Mesh& mesh, std::uint32_t triangle, const Point3& p) {
-    const auto& t = mesh.triangles[triangle];
-    return closest_on_triangle(p, to_point(mesh.positions[t[0]]), to_point(mesh.positions[t[1]]),
-                               to_point(mesh.positions[t[2]]))
-        .squared_distance;
-}
-
 // What is beyond this is farther than `distance` for sure, however distances were rounded.
 double squared_reach(double distance, double largest) {
     const double reach = distance * (1 + 1e-9) + largest * 1e-9;

@@ -76,6 +76,10 @@ struct TrackingNumbers {
     int forgotten_after = 150;    // frames for which a vertex was not seen: the next I-frame leaves it out
     double most_grown = 2.5;      // as most_renewed_vertices, where the reference grows with what is seen
 
+    // Bits are worth so much of the error: by this power of it, since a bit that is saved elsewhere brings as much
+    // (docs/experiments/hierarchy.md).
+    double bits_by_error = 1.6;
+
     // ---- When T-frames follow the reference worse and worse: see fresh_reference.h
     std::uint32_t followed_every = 4;      // of so many frames one is measured
     std::uint32_t least_served = 16;       // frames behind an I-frame before another one may be worth it

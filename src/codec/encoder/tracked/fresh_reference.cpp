@@ -24,12 +24,11 @@ bool may_begin_anew(const TrackedWork& work) {
 // served: the logarithm of bits where the error is equal, since a bit that is saved brings so much. error: of its
 // T-frames, in times of what it is now.
 double change_of_price(const TrackedWork& work, const FollowedError& followed, double intra_bytes, double error) {
-    constexpr double bits_by_error = 1.6;
     const auto& reference = *work.reference;
     const auto served = static_cast<double>(work.sequence.next_frame - reference.intra_frame);
     const double bytes_a_frame = (reference.intra_bytes + reference.patch_bytes + followed.tracked_bytes) / served;
     const double serves = std::min(served, numbers.most_served);
-    return std::log1p(intra_bytes / (serves * bytes_a_frame)) + bits_by_error * std::log(error);
+    return std::log1p(intra_bytes / (serves * bytes_a_frame)) + numbers.bits_by_error * std::log(error);
 }
 
 std::shared_ptr<const MeasuredCapture> measured_capture(const TrackedWork& work, double error) {

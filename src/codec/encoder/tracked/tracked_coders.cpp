@@ -218,13 +218,12 @@ bool codes_levels(const TrackedWork& work, const LatticeMesh& simple) {
            static_cast<double>(simple.positions.size()) <= most_kept * static_cast<double>(mesh.positions.size());
 }
 
-// What a coding of the same surface costs: bits where the error is equal, since a bit that is saved there brings so
-// much (docs/experiments/hierarchy.md).
+// What a coding of the same surface costs: the logarithm of bits where the error is equal.
 double price_of(const TrackedWork& work, const CodedFrame& frame) {
-    constexpr double bits_by_error = 1.6;
     const auto errors = errors_between(work.captured.mesh, work.surface, detailed(frame.detail, frame.decoded),
                                        work.configuration.threads);
-    return std::log(static_cast<double>(frame.bytes())) + bits_by_error * std::log(std::max(errors.geometry_rms, 1e-6));
+    return std::log(static_cast<double>(frame.bytes())) +
+           tracking_numbers.bits_by_error * std::log(std::max(errors.geometry_rms, 1e-6));
 }
 
 Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameSteps& steps, IntraUse use,
