@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""A capture that keeps its vertices from frame to frame, as studios that track deliver it, beside the same surfaces with the
-triangles in another order in each frame, so that nothing says which vertex is which: what htvm encode makes of each.
+"""A capture that keeps its vertices from frame to frame, as studios that track deliver it; the same with vertices and
+triangles in another order in each frame, as Draco leaves them; and the same vertices with one edge in 24 turned in each
+frame, so that nothing says which vertex is which: what htvm encode makes of each.
 
 usage: kept_vertices.py [options] HTVM
 
@@ -49,11 +50,50 @@ class PlyFile:
     def places(self):
         return self.vertices[:, :12].copy().view("<f4").astype(float)
 
-    def write(self, path, places, first_triangle):
+    def corners(self):
+        return self.triangles[:, 1:].copy().view("<u4").astype(int)
+
+    def write(self, path, places, corners, order=None):
+        """order: the vertices in the order in which they are written; none: as they are."""
         rows = self.vertices.copy()
         rows[:, :12] = places.astype("<f4").view(np.uint8).reshape(len(places), 12)
+        if order is not None:
+            number = np.empty(len(order), int)
+            number[order] = np.arange(len(order))
+            rows, corners = rows[order], number[corners]
+        triangles = self.triangles.copy()
+        triangles[:, 1:] = corners.astype("<u4").view(np.uint8).reshape(len(corners), 12)
         with open(path, "wb") as out:
-            out.write(self.head + rows.tobytes() + np.roll(self.triangles, first_triangle, 0).tobytes())
+            out.write(self.head + rows.tobytes() + triangles.tobytes())
+
+
+def with_edges_turned(places, corners, random):
+    """One edge in 24 between two triangles that are nearly in one plane is the other diagonal of the two."""
+    corners = corners.copy()
+    third = {(a, b): (t, c) for t, row in enumerate(corners.tolist()) for a, b, c in (row, row[1:] + row[:1], row[2:] + row[:2])}
+    touched, new_edges = set(), set()
+
+    def normal(a, b, c):
+        n = np.cross(places[b] - places[a], places[c] - places[a])
+        return n / max(np.linalg.norm(n), 1e-12)
+
+    for (a, b), (t, c) in third.items():
+        if a > b or (b, a) not in third or random.random() > 1 / 24:
+            continue
+        u, d = third[b, a]
+        edge = (min(c, d), max(c, d))
+        if {t, u} & touched or edge in new_edges or (c, d) in third or (d, c) in third:
+            continue
+        now = normal(a, b, c)
+        if min(now @ normal(b, a, d), now @ normal(a, d, c), now @ normal(d, b, c)) < 0.98:
+            continue
+        corners[t], corners[u] = (a, d, c), (d, b, c)
+        touched |= {t, u}
+        new_edges.add(edge)
+    return corners
+
+
+captures = {"meshed": "not told", "kept": "vertices kept", "numbered": "kept, numbered anew"}
 
 
 def nearest_marks(places, marks, count):
@@ -81,12 +121,15 @@ def make_captures(arguments, folder):
     marks = [PlyFile(os.path.join(folder, "truth/marks", frame % t)).places() for t in range(arguments.frames)]
     beside = nearest_marks(places, marks[0], 12)
     noise = np.random.default_rng(1)
-    for name in ("kept", "anew"):
+    corners, random = first.corners(), np.random.default_rng(2)
+    for name in captures:
         os.makedirs(os.path.join(folder, name), exist_ok=True)
     for t in range(arguments.frames):
         now = moved(places, marks[0][beside], marks[t][beside]) + noise.normal(0, 0.5, places.shape)
-        first.write(os.path.join(folder, "kept", frame % t), now, 0)
-        first.write(os.path.join(folder, "anew", frame % t), now, t)
+        first.write(os.path.join(folder, "kept", frame % t), now, corners)
+        order = random.permutation(len(places))
+        first.write(os.path.join(folder, "numbered", frame % t), now, random.permutation(corners), order)
+        first.write(os.path.join(folder, "meshed", frame % t), now, with_edges_turned(now, corners, random))
 
 
 def measure(arguments, folder, name, quality):
@@ -98,7 +141,7 @@ def measure(arguments, folder, name, quality):
     kinds = [frame["type"] for frame in frames]
     errors = json.loads(run(arguments.htvm, "compare", capture, stream, "--only", "m2", "--json"))["sequence"]["m2"]
     print("| %s | %g | %d | %.2f | %d, %d | %.1f |" % (
-        {"kept": "vertices kept", "anew": "not told"}[name], quality, os.path.getsize(stream), errors["rms_mm"], kinds.count("I"),
+        captures[name], quality, os.path.getsize(stream), errors["rms_mm"], kinds.count("I"),
         kinds.count("TP"), seconds), flush=True)
 
 
@@ -118,7 +161,7 @@ def main():
         make_captures(arguments, folder)
         print("| capture | `-q` | bytes | M2, mm | I, TP | encoding, s of processor time |\n|---|---|---|---|---|---|")
         for quality in map(float, arguments.qualities.split(",")):
-            for name in ("anew", "kept"):
+            for name in captures:
                 measure(arguments, folder, name, quality)
 
 

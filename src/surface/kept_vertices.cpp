@@ -1,6 +1,8 @@
 #include "surface/kept_vertices.h"
 
 #include <algorithm>
+#include <bit>
+#include <numeric>
 
 #include "core/parallel.h"
 #include "surface/tracked_registration.h"
@@ -25,7 +27,7 @@ std::vector<std::uint32_t> vertices_beside(const DeformableMesh& mesh, std::span
         for (std::size_t i = begin; i < end; ++i) {
             const auto v = mesh.samples[i];
             const auto found = near.nearest(moved[v], normals[v], reach, options.agreement);
-            if (found.found) out[i] = found.index;
+            if (found.found && vertices.again[found.index] != OrientedPoints::no_point) out[i] = found.index;
         }
     });
     return out;
@@ -35,12 +37,79 @@ RigidMotion step_of(const KeptVertices& vertices, std::span<const std::uint32_t>
     std::vector<Vector3d> from, to;
     for (const auto v : which) {
         from.push_back(vector_of(vertices.before[v]));
-        to.push_back(vector_of(vertices.now[v]));
+        to.push_back(vector_of(vertices.now[vertices.again[v]]));
     }
     return align(from, to);
 }
 
+// Any number for any number, such that sums of them tell what was summed (finaliser of splitmix64).
+std::uint64_t scattered(std::uint64_t x) {
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9U;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBU;
+    return x ^ (x >> 31);
+}
+
+// Which vertex alone has a number: a table in which one is looked for from the place on that its last bits say, since
+// numbers are scattered.
+class SingledOut {
+public:
+    explicit SingledOut(std::span<const std::uint64_t> around) : entries_(2 * std::bit_ceil(around.size() + 1)) {
+        for (std::uint32_t v = 0; v < around.size(); ++v) {
+            auto& entry = entries_[place_of(around[v])];
+            entry = {around[v], entry.is == nobody ? v : several};
+        }
+    }
+    // OrientedPoints::no_point if none has it, or several have.
+    std::uint32_t vertex(std::uint64_t number) const {
+        const auto is = entries_[place_of(number)].is;
+        return is == nobody || is == several ? OrientedPoints::no_point : is;
+    }
+
+private:
+    static constexpr std::uint32_t nobody = ~0U, several = ~0U - 1;
+    struct Entry {
+        std::uint64_t number = 0;
+        std::uint32_t is = nobody;
+    };
+
+    std::size_t place_of(std::uint64_t number) const {
+        const std::size_t last = entries_.size() - 1;
+        std::size_t place = static_cast<std::size_t>(number) & last;
+        while (entries_[place].is != nobody && entries_[place].number != number) place = (place + 1) & last;
+        return place;
+    }
+
+    std::vector<Entry> entries_;
+};
+
 }  // namespace
+
+std::vector<std::uint64_t> connectivity_around(std::size_t vertices, std::span<const Triangle> triangles) {
+    constexpr int edges_away = 2;
+    std::vector<std::uint64_t> out(vertices, 1), of_neighbours(vertices), known(vertices);
+    for (const auto& t : triangles)
+        for (const auto v : t) ++out[v];
+    for (int ring = 0; ring < edges_away; ++ring) {
+        std::transform(out.begin(), out.end(), known.begin(), scattered);
+        std::fill(of_neighbours.begin(), of_neighbours.end(), 0);
+        for (const auto& t : triangles)
+            for (std::size_t i = 0; i < 3; ++i) of_neighbours[t[i]] += known[t[(i + 1) % 3]];
+        for (std::size_t v = 0; v < vertices; ++v) out[v] = scattered(3 * out[v] + of_neighbours[v]);
+    }
+    return out;
+}
+
+std::vector<std::uint32_t> vertices_again(std::span<const std::uint64_t> before, std::span<const std::uint64_t> now) {
+    std::vector<std::uint32_t> out(before.size(), OrientedPoints::no_point);
+    if (std::equal(before.begin(), before.end(), now.begin(), now.end())) {
+        std::iota(out.begin(), out.end(), 0U);
+        return out;
+    }
+    const SingledOut of_before(before), of_now(now);
+    for (std::uint32_t v = 0; v < before.size(); ++v)
+        if (of_before.vertex(before[v]) == v) out[v] = of_now.vertex(before[v]);
+    return out;
+}
 
 std::vector<RigidMotion> carried_by_vertices(const DeformableMesh& mesh, std::span<const RigidMotion> last,
                                              const KeptVertices& vertices, const KeptVerticesOptions& options) {

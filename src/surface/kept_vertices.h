@@ -1,8 +1,11 @@
 // How the vertices of a capture that keeps them move a reference. Captures that somebody has tracked already have the
-// same triangles for many frames, so each vertex says where its piece of surface has gone, however far. Encoder only: a
-// registration begins there, and what is nearer to the surface is kept.
+// same triangles for many frames, so each vertex says where its piece of surface has gone, however far. Where a program
+// between has numbered vertices anew, or left out a few triangles that coordinates of few bits had closed, connectivity
+// still tells most of them: each vertex is known by that around it (colour refinement: Weisfeiler, Leman, 1968).
+// Encoder only: a registration begins there, and what is nearer to the surface is kept.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -22,10 +25,20 @@ struct KeptVerticesOptions {
     Threads threads = {};
 };
 
-// A capture's positions in two frames whose triangles are the same.
+// Each vertex's connectivity up to two edges away as a number, which does not depend on how vertices and triangles are
+// numbered. Of a scanned person's vertices 99 in 100 have one that no other has; on a grid of another frame 4 in 100
+// are found again, by chance.
+std::vector<std::uint64_t> connectivity_around(std::size_t vertices, std::span<const Triangle> triangles);
+
+// For each vertex of a mesh the one of another mesh that alone has the same connectivity_around(), if it is the only
+// one in its own mesh too; OrientedPoints::no_point for the others. Where all are equal in their order, each is itself.
+std::vector<std::uint32_t> vertices_again(std::span<const std::uint64_t> before, std::span<const std::uint64_t> now);
+
+// A capture's positions in two frames, and vertices_again().
 struct KeptVertices {
     std::span<const Point3f> before, now;
-    std::span<const Triangle> triangles;
+    std::span<const Triangle> triangles;  // of the frame before
+    std::span<const std::uint32_t> again;
 };
 
 // The motions reference -> frame, one per handle: each as at `last` (one per handle, or none: at rest), carried on by

@@ -151,7 +151,7 @@ TEST(FrameReasons, TellOfACutHoweverCoarseTheCaptureIs) {
 TEST(FrameReasons, TellOfSurfaceThatIsOffEverywhere) {
     auto sequence = horned_ball(3, never);
     for (auto& p : sequence.frames[2].mesh.positions)
-        for (auto& c : p) c += 6 * std::sin(c / 9);
+        for (auto& c : p) c += 12 * std::sin(c / 9);
     EXPECT_EQ(reasons_of(encode(sequence, without_patches())), (std::vector{none, none, surface}));
 }
 
@@ -176,7 +176,7 @@ TEST(FrameReasons, TellOfSurfaceThatComesIntoViewAndIsAddedByTheNextFrame) {
 }
 
 TEST(FrameReasons, TellOfWhatIsLostWhereSurfaceComesAndGoesOnceTwoPatchesWereInVain) {
-    auto open = horned_ball(9, 4, 130, 0.2);
+    auto open = horned_ball(9, 4, 120, 0.2);
     for (auto& frame : open.frames) {
         const auto below = [&](const auto& triangle) {
             return std::any_of(triangle.begin(), triangle.end(),
@@ -199,7 +199,7 @@ TEST(FrameReasons, TellThatThereAreTooManyPatches) {
     auto sequence = horned_ball(1, never);
     for (int t = 1; t < 9; ++t) sequence.frames.push_back(horned_ball(2, t % 2 == 0 ? never : 1).frames[1]);
     sequence.frames.push_back(sequence.frames.back());
-    const auto coded = encode(meshed_anew(sequence), patched_options());
+    const auto coded = encode(numbered_anew(sequence), patched_options());
     EXPECT_EQ(coded.infos.back().type, FrameType::intra);
     EXPECT_EQ(coded.infos.back().reason, patches);
 }

@@ -1,4 +1,4 @@
-// Captures that somebody has tracked already: the same triangles frame after frame.
+// Captures that somebody has tracked already: the same connectivity frame after frame.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -42,6 +42,7 @@ std::size_t intra_frames(const TestSequence& sequence, unsigned threads = 1) {
 TEST(KeptVertices, AreFollowedFartherThanASurfaceCanBe) {
     const auto sequence = tumbling(4);
     EXPECT_EQ(intra_frames(sequence), 1u);
+    EXPECT_EQ(intra_frames(numbered_anew(sequence)), 1u);
     EXPECT_EQ(intra_frames(meshed_anew(sequence)), 4u);
 }
 

@@ -17,6 +17,7 @@
 #include "codec/tfan_test_meshes.h"
 #include "htvm/decoder.hpp"
 #include "htvm/encoder.hpp"
+#include "surface/other_meshings.h"
 #include "synth/synth.h"
 
 namespace htvm::test {
@@ -81,12 +82,17 @@ inline TestSequence sequence_of(const tfan_test::TestMesh& shape, int frames, un
     return out;
 }
 
-// The same surfaces with the triangles in another order in each frame: nothing says then that its vertices were kept.
+// The same vertices with other triangles in each frame: nothing says then that they were kept.
 inline TestSequence meshed_anew(TestSequence sequence) {
-    for (std::size_t t = 0; t < sequence.frames.size(); ++t) {
-        auto& triangles = sequence.frames[t].mesh.triangles;
-        std::rotate(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(t), triangles.end());
-    }
+    for (std::size_t t = 0; t < sequence.frames.size(); ++t)
+        flip_edges(sequence.frames[t].mesh, 24, static_cast<std::uint32_t>(t));
+    return sequence;
+}
+
+// The same surfaces with vertices and triangles in another order in each frame, as programs between leave them.
+inline TestSequence numbered_anew(TestSequence sequence) {
+    for (std::size_t t = 0; t < sequence.frames.size(); ++t)
+        sequence.frames[t].mesh = renumbered(std::move(sequence.frames[t].mesh), t);
     return sequence;
 }
 

@@ -484,12 +484,23 @@ Vector3d thrown(const Vector3d& p) {
     return Eigen::AngleAxisd(2.6, Vector3d::UnitZ()) * bent(p, 1.2) + Vector3d(100, 200, 50);
 }
 
+// All its vertices are known again, in their order.
+struct KeptSurface {
+    std::vector<std::uint32_t> again;
+    KeptVertices vertices;
+};
+KeptSurface kept(const Surface& before, const Surface& now) {
+    KeptSurface out{std::vector<std::uint32_t>(before.first.size()), {}};
+    std::iota(out.again.begin(), out.again.end(), 0U);
+    out.vertices = {before.first, now.first, before.second, out.again};
+    return out;
+}
+
 TEST(CarriedByVertices, LayATubeWhereItsVerticesHaveGone) {
     const auto reference = sweep(121, 40, arm), captured = sweep(97, 52, arm);
     const auto now = moved(captured, thrown);
     const auto mesh = with_handles_along_x(reference, 0, 600, 9, in_millimetres());
-    const auto motions =
-        carried_by_vertices(mesh, {}, {captured.first, now.first, captured.second}, {.scale = {.units = 1}});
+    const auto motions = carried_by_vertices(mesh, {}, kept(captured, now).vertices, {.scale = {.units = 1}});
     const auto moved_reference = deform(mesh, motions, {});
     for (std::size_t v = 0; v < moved_reference.size(); ++v)
         EXPECT_LT((vector(moved_reference[v]) - thrown(vector(reference.first[v]))).norm(), 6) << v;
@@ -501,8 +512,7 @@ TEST(CarriedByVertices, GoOnFromWhereTheReferenceWasLast) {
     const auto before = moved(sweep(97, 52, arm), last), now = moved(before, thrown);
     const auto mesh = with_handles_along_x(reference, 0, 600, 9, in_millimetres());
     const std::vector<RigidMotion> lasts(mesh.handles.size(), last);
-    const auto motions =
-        carried_by_vertices(mesh, lasts, {before.first, now.first, before.second}, {.scale = {.units = 1}});
+    const auto motions = carried_by_vertices(mesh, lasts, kept(before, now).vertices, {.scale = {.units = 1}});
     for (std::size_t h = 0; h < motions.size(); ++h)
         EXPECT_LT((motions[h](mesh.handles[h]) - thrown(last(mesh.handles[h]))).norm(), 30) << h;
 }
@@ -516,8 +526,7 @@ TEST(CarriedByVertices, TakeHandlesWithoutVerticesAlong) {
     const Vector3d shift(0, 900, 0);
     const auto now = moved(captured, [&](const Vector3d& p) -> Vector3d { return p + shift; });
     const auto mesh = with_handles_along_x(reference, 0, 600, 9, in_millimetres());
-    const auto motions =
-        carried_by_vertices(mesh, {}, {captured.first, now.first, captured.second}, {.scale = {.units = 1}});
+    const auto motions = carried_by_vertices(mesh, {}, kept(captured, now).vertices, {.scale = {.units = 1}});
     ASSERT_EQ(motions.size(), mesh.handles.size());
     for (const auto& motion : motions) EXPECT_LT((motion.shift - shift).norm(), 0.1);
 }
@@ -526,7 +535,7 @@ TEST(CarriedByVertices, AreNoneWhereNoVertexIsBesideTheReference) {
     const auto reference = sweep(121, 40, arm);
     const auto far = moved(sweep(97, 52, arm), [](const Vector3d& p) -> Vector3d { return p + Vector3d(0, 0, 5000); });
     const auto mesh = with_handles_along_x(reference, 0, 600, 9, in_millimetres());
-    EXPECT_TRUE(carried_by_vertices(mesh, {}, {far.first, far.first, far.second}, {.scale = {.units = 1}}).empty());
+    EXPECT_TRUE(carried_by_vertices(mesh, {}, kept(far, far).vertices, {.scale = {.units = 1}}).empty());
 }
 
 }  // namespace

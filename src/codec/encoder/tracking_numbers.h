@@ -4,6 +4,9 @@
 // target_filter.cpp.
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "core/length.h"
 
 namespace htvm::internal {
@@ -36,14 +39,15 @@ struct TrackingNumbers {
     double simplified_colours = 2.5;    // how far a simplified vertex's colour may be off, in steps asked for
 
     // ---- When tracking is lost
-    double stray_in_edges = 2;      // a sample is astray that is farther off, in mean edges of the captured mesh
-    double more_strays = 0.004;     // lost: by how much more of the samples are astray than of the I-frame's
-    double worst_to_best = 2.2;     // lost: RMS distance over that of the best T-frame
-    double quantised = 0.75;        // but not below this many steps asked for: on a clean capture the best T-frame may
-                                    // be far better than quantisation lets an I-frame be
-    double region_to_best = 5;      // lost: RMS distance in the worst region over that of the best T-frame's whole
-    double region_to_intra = 1.5;   // but not below this many times the I-frame's worst region,
-    AdultMillimetres visible{3.5};  // nor below what is seen,
+    double stray_in_edges = 2;   // a sample is astray that is farther off, in mean edges of the captured mesh
+    double more_strays = 0.004;  // lost: by how much more of the samples are astray than of the I-frame's
+    double worst_to_best = 2.2;  // lost: RMS distance over that of the best T-frame
+    double quantised = 0.75;     // but not below this many steps asked for: on a clean capture the best T-frame may
+                                 // be far better than quantisation lets an I-frame be
+    AdultMillimetres visible_over_all{0.8};  // nor below this: at fine quality T-frames bring it back
+    double region_to_best = 5;        // lost: RMS distance in the worst region over that of the best T-frame's whole
+    double region_to_intra = 1.5;     // but not below this many times the I-frame's worst region,
+    AdultMillimetres visible{3.5};    // nor below what is seen,
     double remeshed_in_edges = 0.42;  // nor below what re-meshing does to a surface: in mean edges of the captured mesh
 
     // ---- When the picture falls apart
@@ -80,14 +84,12 @@ struct TrackingNumbers {
     // (docs/experiments/hierarchy.md).
     double bits_by_error = 1.6;
 
-    // ---- When T-frames follow the reference worse and worse: see fresh_reference.h
-    std::uint32_t followed_every = 4;      // of so many frames one is measured
-    std::uint32_t least_served = 16;       // frames behind an I-frame before another one may be worth it
-    double most_served = 60;               // frames that one is expected to serve: as many as the last, but these
-    double later_error = 1.1;              // of its T-frames on average, in times of that of the one that is tried
-    double least_saved = 0.4;              // of the price of these frames, as a logarithm
-    std::uint32_t tried_again_after = 30;  // frames,
-    double tried_again_from = 1.3;         // or from this many times the error
+    // ---- Where a capture keeps its vertices for a while, then is begun anew: see fresh_reference.h
+    double vertices_again = 0.5;                      // share of them that is known again, from which on they are kept
+    std::uint32_t least_kept = 8;                     // frames in a row: fewer are not worth an I-frame
+    std::array<std::uint32_t, 2> measured_at{4, 12};  // frames behind an I-frame: how far its T-frames are off
+    double most_served = 60;    // frames that one is expected to serve: as many as before, but these
+    double least_saved = 0.15;  // of the price of these frames, as a logarithm
 
     // ---- When an I-frame is sent
     double most_others = 0.1;  // share of the vertices that have other texture coordinates: the atlas is laid out anew

@@ -28,7 +28,8 @@ LatticeUnits allowed_in_region(const TrackedWork& work, LatticeUnits best) {
 // an I-frame or a patch be.
 LatticeUnits allowed_over_all(const TrackedWork& work, LatticeUnits best) {
     const LatticeUnits step(work.reference->origin.steps.geometry);
-    return std::max(numbers.worst_to_best * best, numbers.quantised * step);
+    return std::max({numbers.worst_to_best * best, numbers.quantised * step,
+                     work.configuration.scale.on_lattice(numbers.visible_over_all)});
 }
 
 // Why the picture falls apart: most of the person is lost, as where a capture is cut, or all of a limb. Nothing if it
@@ -295,7 +296,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     const bool due = intra_is_due(work);
     const auto& history = work.sequence.history;
     auto in_vain = history.in_vain;
-    auto followed = history.followed;
+    auto followed = followed_on(history.followed, tracking.registered->vertices_again);
     const auto send = [&](CodedMotion coded, LatticeUnits best, std::optional<FrameReason> to_patch = {}) {
         auto out = chosen_motion(work, *tracking.registered, std::move(coded), best);
         out.history.to_patch = to_patch;
@@ -316,7 +317,10 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     if (history.to_patch && patches && !work.effort.motion_alone) {
         auto patched = patch_as_planned(work, *tracking.registered, steps, *history.to_patch, in_vain);
         if (!patched) return tl::unexpected(patched.error());
-        if (*patched) return std::move(**patched);
+        if (*patched) {
+            std::get<TrackedPatch>(**patched).followed = followed;
+            return std::move(**patched);
+        }
     }
 
     // 3. A T-frame, and how well it fits. Behind an I-frame it is not known yet how well its T-frames can fit; where
@@ -347,7 +351,17 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         if (auto ok = look_for_limbs(work, tracking, steps, patches, *motion); !ok) return tl::unexpected(ok.error());
     }
 
-    // 5. Where it still is: a patch, or an I-frame that lets the frames behind it follow better.
+    // 5. An I-frame, where the capture is begun anew and its T-frames will be nearer.
+    if (!due) {
+        auto fresh = fresh_reference(work, motion->coded, motion->lost.has_value(), steps, followed);
+        if (!fresh) return tl::unexpected(fresh.error());
+        if (*fresh) {
+            (*fresh)->followed = followed_from_intra(followed);
+            return Frame(std::move(**fresh));
+        }
+    }
+
+    // 6. Where it still is: a patch, or an I-frame that lets the frames behind it follow better.
     const auto& tracked = motion->coded.encoded;
     const auto anew = why_anew(work, motion->coded);
     if (!anew && patches && motion->lost) {
@@ -355,31 +369,23 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
             patch(work, *tracking.registered, steps, motion->to_patch(), why_patched(*motion->lost), Replaced::all);
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) {
-            auto& sent = **patched;
-            auto fresh =
-                fresh_reference(work, {sent.frame.decoded, sent.frame.detail, motion->coded.bytes()}, steps, followed);
-            if (!fresh) return tl::unexpected(fresh.error());
-            if (*fresh) return Frame(std::move(**fresh));
-            sent.in_vain = in_vain;
-            sent.followed = followed;
-            return Frame(std::move(sent));
+            (*patched)->in_vain = in_vain;
+            (*patched)->followed = followed;
+            return Frame(std::move(**patched));
         }
     }
 
-    // 6. The T-frame, or an I-frame: of the tracked mesh, where that is as good; or where its T-frames will be nearer.
+    // 7. The T-frame, or an I-frame: of the tracked mesh, where that is as good.
     const bool best = !motion->lost && (history.best_fit.value == 0 || motion->fit.rms < history.best_fit);
     const auto best_fit = best ? motion->fit.rms : history.best_fit;
     const auto reason = why_intra(work, due, motion->lost, anew);
     if (!reason) {
-        auto fresh = fresh_reference(work, {tracked.mesh, work.reference->decoded.detail, motion->coded.bytes()}, steps,
-                                     followed);
-        if (!fresh) return tl::unexpected(fresh.error());
-        if (*fresh) return Frame(std::move(**fresh));
         const bool grows = growth_is_due(work, motion->fit, in_vain);
         return send(std::move(motion->coded), best_fit, grows ? std::optional(FrameReason::border) : std::nullopt);
     }
     const bool renewed = !anew && !motion->lost && may_be_renewed(work, steps, tracked.mesh);
     auto intra = renewed ? code_renewal(work, steps, tracked, *reason) : code_intra(work, steps, *reason);
+    if (intra) intra->followed = followed_from_intra(followed);
     if (intra && !motion->lost) intra->best_fit = best_fit;
     return as_frame(std::move(intra));
 }

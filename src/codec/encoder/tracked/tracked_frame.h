@@ -70,6 +70,7 @@ struct NodeRegistration {
     DeformationForm form;              // how well the captured surface determines it
     std::size_t start = 0;             // which of the starts it began at
     std::vector<RigidMotion> carried;  // NodeStarts::carried
+    double vertices_again = 0;         // share of the vertices captured in the frame before that are known in this one
 };
 // From the start that lies nearest to the surface.
 NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,

@@ -30,18 +30,23 @@ void derive_what_is_left(const Configuration& configuration, TrackedSequence& se
     clock.done("reference");
 }
 
+void find_surface(const Configuration& configuration, TrackedStrategy::Waiting& frame, std::vector<StageTime>& stages) {
+    if (!frame.ahead.surface) frame.ahead.surface = surface_of(configuration, frame.captured, stages);
+    if (!frame.ahead.vertices) frame.ahead.vertices = vertices_of(frame.captured.mesh);
+}
+
 }  // namespace
 
 TrackedWork begin_work(const Configuration& configuration, TrackedStrategy& strategy, TrackedStrategy::Waiting frame,
                        Tracking& tracking, std::vector<StageTime>& stages) {
     derive_what_is_left(configuration, strategy.sequence, stages);
+    find_surface(configuration, frame, stages);
     auto& [captured, ahead] = frame;
-    if (!ahead.surface) ahead.surface = surface_of(configuration, captured, stages);
     tracking.registered = std::move(ahead.registered);
     const auto effort = tracking_effort(captured.effort);
     TrackedWork work{configuration, strategy.sequence,   strategy.sequence.reference.get(),
                      stages,        std::move(captured), effort,
-                     ahead.surface, *ahead.surface};
+                     ahead.surface, *ahead.surface,      ahead.vertices};
     if (!can_refer(work)) return work;
     const auto& registered = register_once(work, tracking);
     if (configuration.shared && !configuration.follows)
@@ -61,19 +66,15 @@ TrackedAssumption assume(const TrackedWork& work, const Tracking& tracking) {
 
 namespace {
 
-void find_surface(const Configuration& configuration, TrackedStrategy::Waiting& frame, std::vector<StageTime>& stages) {
-    if (!frame.ahead.surface) frame.ahead.surface = surface_of(configuration, frame.captured, stages);
-}
-
 void register_next(const TrackedWork& work, const Tracking& tracking, const TrackedAssumption& assumed,
                    TrackedStrategy::Waiting& next, std::vector<StageTime>& stages) {
     find_surface(work.configuration, next, stages);
     if (work.configuration.follows) return;  // the other encoder has yet to come to that frame
     if (assumed.nodes && !tracking.lost && can_be_moved(work.sequence, next.captured.mesh))
-        next.ahead.registered = register_frame(work.configuration, *work.reference, *next.ahead.surface, next.captured,
-                                               {assumed.nodes->motion, work.sequence.history.last, {}, {}, {}},
-                                               {work.captured.mesh.positions, work.captured.mesh.triangles},
-                                               present(work.sequence, true), stages, &tracking.lost);
+        next.ahead.registered =
+            register_frame(work.configuration, *work.reference, *next.ahead.surface, next.captured,
+                           {assumed.nodes->motion, work.sequence.history.last, {}, {}, {}}, work.vertices.get(),
+                           *next.ahead.vertices, present(work.sequence, true), stages, &tracking.lost);
 }
 
 }  // namespace
@@ -125,16 +126,9 @@ Result<std::shared_ptr<TrackedReference>> reference_of(const TrackedWork& work, 
     return out;
 }
 
-std::shared_ptr<const CapturedVertices> vertices_of(const CapturedFrame& captured) {
-    return std::make_shared<const CapturedVertices>(CapturedVertices{captured.mesh.positions, captured.mesh.triangles});
-}
-
 Result<TrackedSequence> after(const TrackedWork& work, TrackedMotion& motion) {
-    return TrackedSequence{work.sequence.next_frame + 1,
-                           work.sequence.reference,
-                           std::move(motion.history),
-                           vertices_of(work.captured),
-                           {}};
+    return TrackedSequence{
+        work.sequence.next_frame + 1, work.sequence.reference, std::move(motion.history), work.vertices, {}};
 }
 
 Result<TrackedSequence> after(const TrackedWork& work, TrackedIntra& intra) {
@@ -152,7 +146,8 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedIntra& intra) {
     out.history.best_fit = intra.best_fit;
     out.history.targets = on_new_reference(before.history.targets, {}, 0, {});
     out.history.presence = std::move(intra.presence);
-    out.captured = vertices_of(work.captured);
+    out.history.followed = intra.followed;
+    out.captured = work.vertices;
     out.reference = std::move(*reference);
     return out;
 }
@@ -174,7 +169,7 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedPatch& patch) {
     out.history.presence = std::move(patch.presence);
     out.history.in_vain = patch.in_vain;
     out.history.followed = patch.followed;
-    out.captured = vertices_of(work.captured);
+    out.captured = work.vertices;
     out.to_derive = {*reference, work.sequence.reference, std::move(patch.before_last), std::move(patch.last)};
     out.reference = std::move(*reference);
     return out;

@@ -29,24 +29,27 @@ std::vector<std::uint8_t> shown_presence(const TrackedReference& reference, std:
     return out;
 }
 
-// Where a capture that has kept its vertices moves each node; none if it has not.
-std::vector<RigidMotion> carried_nodes(const Configuration& configuration, const TrackedReference& reference,
-                                       const LatticeMesh& captured, const VerticesBefore& before,
-                                       std::span<const RigidMotion> last) {
-    const bool kept = before.positions.size() == captured.positions.size() &&
-                      std::equal(before.triangles.begin(), before.triangles.end(), captured.triangles.begin(),
-                                 captured.triangles.end());
-    if (!kept || captured.positions.empty()) return {};
-    const auto was = points_of(before.positions), is = points_of(captured.positions);
+// Where a capture moves each node that has kept its vertices, and the share of those that are known again; no motions
+// if too few are: then it is another mesh, and those few are known by chance.
+struct CarriedNodes {
+    std::vector<RigidMotion> motion;
+    double again = 0;
+};
+CarriedNodes carried_nodes(const Configuration& configuration, const TrackedReference& reference,
+                           const CapturedVertices& before, const CapturedVertices& now,
+                           std::span<const RigidMotion> last) {
+    CarriedNodes out;
+    if (before.positions.empty() || now.positions.empty()) return out;
+    const auto again = vertices_again(before.around, now.around);
+    const auto unknown = std::count(again.begin(), again.end(), OrientedPoints::no_point);
+    out.again = 1 - static_cast<double>(unknown) / static_cast<double>(again.size());
+    if (out.again < tracking_numbers.vertices_again) return out;
+    const auto was = points_of(before.positions), is = points_of(now.positions);
     KeptVerticesOptions options;
     options.scale = configuration.scale;
     options.threads = configuration.threads;
-    return carried_by_vertices(reference.deformable, last, {was, is, captured.triangles}, options);
-}
-
-VerticesBefore vertices_before(const TrackedSequence& sequence) {
-    if (!sequence.captured) return {};
-    return {sequence.captured->positions, sequence.captured->triangles};
+    out.motion = carried_by_vertices(reference.deformable, last, {was, is, before.triangles, again}, options);
+    return out;
 }
 
 std::int64_t frames_since_intra(const TrackedWork& work) {
@@ -75,6 +78,11 @@ bool may_be_intra(const TrackedWork& work) {
     return frames_since_intra(work) >= work.configuration.options.least_key_interval;
 }
 
+std::shared_ptr<const CapturedVertices> vertices_of(const LatticeMesh& captured) {
+    return std::make_shared<const CapturedVertices>(CapturedVertices{
+        captured.positions, captured.triangles, connectivity_around(captured.positions.size(), captured.triangles)});
+}
+
 std::shared_ptr<const SurfaceIndex> surface_of(const Configuration& configuration, const CapturedFrame& captured,
                                                std::vector<StageTime>& stages) {
     const auto& lattice = configuration.header.lattice;
@@ -98,13 +106,14 @@ std::shared_ptr<const SurfaceIndex> surface_of(const Configuration& configuratio
 
 NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
                                 const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
-                                const VerticesBefore& before, std::span<const std::uint8_t> presence,
-                                std::vector<StageTime>& stages, const std::atomic<bool>* in_vain) {
+                                const CapturedVertices* before, const CapturedVertices& now,
+                                std::span<const std::uint8_t> presence, std::vector<StageTime>& stages,
+                                const std::atomic<bool>* in_vain) {
     StageClock clock(stages);
     const auto skeletal = skeletal_node_motion(configuration, reference.decoded, captured.pose);
-    const auto carried = carried_nodes(configuration, reference, captured.mesh, before, starts.last);
+    const auto carried = before ? carried_nodes(configuration, reference, *before, now, starts.last) : CarriedNodes{};
     starts.skeletal = skeletal;
-    starts.carried = carried;
+    starts.carried = carried.motion;
     std::vector<RigidMotion> shared;
     if (configuration.follows)
         shared = configuration.shared->start(captured.timestamp_us, configuration.header.lattice, reference.deformable,
@@ -115,6 +124,7 @@ NodeRegistration register_frame(const Configuration& configuration, const Tracke
     const auto present = shown_presence(reference, presence);
     options.present = present;
     auto out = register_nodes(reference.deformable, surface, starts, options);
+    out.vertices_again = carried.again;
     clock.done("registration");
     return out;
 }
@@ -128,9 +138,10 @@ std::span<const std::uint8_t> present(const TrackedSequence& sequence, bool behi
 const NodeRegistration& register_once(const TrackedWork& work, Tracking& tracking) {
     if (!tracking.registered) {
         const auto& history = work.sequence.history;
-        tracking.registered = register_frame(work.configuration, *work.reference, work.surface, work.captured,
-                                             {history.last, history.before_last, history.gone_on, {}, {}},
-                                             vertices_before(work.sequence), present(work.sequence), work.stages);
+        tracking.registered =
+            register_frame(work.configuration, *work.reference, work.surface, work.captured,
+                           {history.last, history.before_last, history.gone_on, {}, {}}, work.sequence.captured.get(),
+                           *work.vertices, present(work.sequence), work.stages);
     }
     return *tracking.registered;
 }

@@ -48,20 +48,15 @@ struct VainAttempts {
     std::optional<std::uint32_t> repair;  // patching what is lost, as the frame before had asked
 };
 
-// A captured mesh on which a new reference may be tried, without its attributes.
-struct MeasuredCapture {
-    LatticeMesh mesh;
-    std::shared_ptr<const SurfaceIndex> surface;
-    double error = 0;  // RMS distance between it and what was sent
-};
-
-// How far the frames since the I-frame were off, as far as they were measured: see fresh_reference.h.
-struct FollowedError {
-    std::shared_ptr<const MeasuredCapture> last;  // of the last frame that was measured; null: none was
-    double least = 0;                             // RMS distance between the surfaces; 0: of none yet
-    double tracked_bytes = 0;                     // of the T-frames since the I-frame
-    std::optional<std::uint32_t> tried;           // number of the last frame in whose place an I-frame was tried
-    double error_when_tried = 0;                  // of that frame
+// A capture that keeps its vertices, and how well it is followed: see fresh_reference.h.
+struct FollowedCapture {
+    std::uint32_t frames = 0;    // in a row whose vertices are those of the frame before, this one the last
+    std::uint32_t expected = 0;  // in a row, behind a frame with other vertices: as there were before the last one,
+                                 // or half as many as were expected there, if that is more
+    double tracked_bytes = 0;    // of the T-frames since the I-frame
+    double squared = 0;          // RMS distance between the surfaces squared, of all measured T-frames of one I-frame
+    int measured = 0;            // together, and how many those are: the last I-frame of which there are any
+    std::uint32_t of_intra = 0;  // its number
 };
 
 // What the T-frames since the reference leave for the next one.
@@ -78,13 +73,14 @@ struct MotionHistory {
     LatticeUnits best_fit;                // RMS of the best so far; 0: none yet
     std::optional<FrameReason> to_patch;  // why the next frame should be a TP-frame at once; nothing if it need not
     VainAttempts in_vain;
-    FollowedError followed;
+    FollowedCapture followed;
 };
 
 // A captured mesh without its attributes: the next one may have kept its vertices.
 struct CapturedVertices {
     std::vector<LatticePoint> positions;
     std::vector<Triangle> triangles;
+    std::vector<std::uint64_t> around;  // connectivity_around()
 };
 
 // Behind a TP-frame: what is still to be derived of the reference that it became. That is a fifth of a T-frame's time,
@@ -107,6 +103,7 @@ struct TrackedSequence {
 // What was found of a frame that waits, while others were coded.
 struct TrackedAhead {
     std::shared_ptr<const SurfaceIndex> surface;
+    std::shared_ptr<const CapturedVertices> vertices;
     std::optional<NodeRegistration> registered;  // as if the frame before had been a T-frame
 };
 
@@ -133,6 +130,7 @@ struct TrackedIntra {
     CodedPose pose;
     PresenceHistory presence = {};  // MotionHistory::presence, of a renewed one
     LatticeUnits best_fit;          // MotionHistory::best_fit, which lasts as long as tracking does; 0: it begins anew
+    FollowedCapture followed;       // MotionHistory::followed
 };
 // A TP-frame, which becomes the reference.
 struct TrackedPatch {
@@ -145,7 +143,7 @@ struct TrackedPatch {
     std::vector<RigidMotion> before_last, last;  // of each node of the reference before, up to this frame
     LatticeUnits best_fit;                       // as of an I-frame
     VainAttempts in_vain;                        // as of a T-frame
-    FollowedError followed;                      // likewise
+    FollowedCapture followed;                    // likewise
 };
 
 // The frame that is coded, and what is found of it before that. Attempts share it and leave it as it is.
@@ -161,6 +159,7 @@ struct TrackedWork {
     TrackingEffort effort;
     std::shared_ptr<const SurfaceIndex> kept_surface;
     const SurfaceIndex& surface;  // the same: the captured surface, indexed by direction too; empty without triangles
+    std::shared_ptr<const CapturedVertices> vertices;
 };
 
 // A frame without triangles is an I-frame that nothing refers to, and leaves the reference as it was.
@@ -179,6 +178,9 @@ inline CodedFrame& coded_frame(TrackedWork::Frame& frame) {
     return std::visit([](auto& of_kind) -> CodedFrame& { return of_kind.frame; }, frame);
 }
 
+// What is kept of a captured mesh for the frame behind it.
+std::shared_ptr<const CapturedVertices> vertices_of(const LatticeMesh& captured);
+
 // The captured surface, with the colours that serve tracking; what another encoder has made of the same frame is taken.
 std::shared_ptr<const SurfaceIndex> surface_of(const Configuration& configuration, const CapturedFrame& captured,
                                                std::vector<StageTime>& stages);
@@ -187,18 +189,14 @@ std::shared_ptr<const SurfaceIndex> surface_of(const Configuration& configuratio
 // coded, what was there before that one. One per vertex, or none: all is. behind: of the frame behind the next one.
 std::span<const std::uint8_t> present(const TrackedSequence& sequence, bool behind = false);
 
-// The mesh that was captured one frame before; empty if there is none.
-struct VerticesBefore {
-    std::span<const LatticePoint> positions;
-    std::span<const Triangle> triangles;
-};
-// Registers the reference's nodes to a captured surface. starts: but for the skeleton's and the vertices'. before: what
-// was captured in the frame that starts.last is of. presence: what of the reference was seen lately. in_vain: may end
-// it early.
+// Registers the reference's nodes to a captured surface. starts: but for the skeleton's and the vertices'. now: of this
+// frame; before: of the frame that starts.last is of, or null. presence: what of the reference was seen lately.
+// in_vain: may end it early.
 NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
                                 const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
-                                const VerticesBefore& before, std::span<const std::uint8_t> presence,
-                                std::vector<StageTime>& stages, const std::atomic<bool>* in_vain = nullptr);
+                                const CapturedVertices* before, const CapturedVertices& now,
+                                std::span<const std::uint8_t> presence, std::vector<StageTime>& stages,
+                                const std::atomic<bool>* in_vain = nullptr);
 // The same of the frame that is coded, unless it is registered already.
 const NodeRegistration& register_once(const TrackedWork& work, Tracking& tracking);
 

@@ -14,8 +14,7 @@ TrackingEffort tracking_effort(int effort) {
     if (effort <= 2) out.coarse_rounds = 3, out.surface_rounds = 1, out.levels = false;
     if (effort <= 1) out.solver_iterations = 20;
     if (effort <= 0) out.fine_rounds = 2, out.surface_rounds = 0, out.motion_alone = true;
-    if (effort >= 6)
-        out.target_samples = TargetSamples::three, out.group = 2, out.thorough_levels = out.fresh_references = true;
+    if (effort >= 6) out.target_samples = TargetSamples::three, out.group = 2, out.thorough_levels = true;
     if (effort >= 7) out.fine_rounds = 4, out.solver_iterations = 40, out.group = 4;
     if (effort >= 8) out.samples = 1.5, out.fine_rounds = 5, out.group = 8;
     if (effort >= 9)

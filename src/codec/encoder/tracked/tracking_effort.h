@@ -19,9 +19,8 @@ struct TrackingEffort {
     bool levels = true;                // whether references are coded in levels unless it is said; and whether with
     bool thorough_levels = false;      // all rounds of their fit, which take twice the time for 2 % of the bits
     bool always_other_starts = false;  // other starts are registered for every frame, not for lost ones alone
-    bool fresh_references = false;  // I-frames are tried though nothing is lost, which takes seconds: fresh_reference.h
-    int group = 1;                  // TrackedOptions::group where that is not given
-    bool motion_alone = false;      // nothing but the motion of the nodes is coded, unless the picture falls apart
+    int group = 1;                     // TrackedOptions::group where that is not given
+    bool motion_alone = false;         // nothing but the motion of the nodes is coded, unless the picture falls apart
 };
 
 // effort: 0 to most_effort. 0 is what a frame gets that would be late: see Encoder::set_effort().
