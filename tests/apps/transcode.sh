@@ -86,3 +86,4 @@ for side in width height; do
     own=$(json film.htvm "[\"pictures\"][\"$side\"]")
     [ "$(json film.h264.htvm "[\"pictures\"][\"$side\"]")" = $((own + own % 2)) ] || fail "the $side of $own becomes $(json film.h264.htvm "[\"pictures\"][\"$side\"]")"
 done
+done_with "pictures are coded anew as they should be, and nothing else"
