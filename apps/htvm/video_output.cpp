@@ -90,12 +90,11 @@ Result<VideoOutput> VideoOutput::open(const VideoOptions& options) {
 
 Result<void> VideoOutput::start_ffmpeg() {
     const fs::path path = options_.path;
-    std::error_code ignored;
-    if (!path.parent_path().empty() && !fs::is_directory(path.parent_path(), ignored))
-        return fail(ErrorKind::bad_input, fmt::format("{} cannot be written: there is no folder {}; make it first",
-                                                      options_.path, path.parent_path().string()));
     const auto* format = video_format(path);
-    partial_ = options_.path + ".partial";
+    // Made here, so that a place that cannot be written to is told of before ffmpeg complains in its own words.
+    auto file = OutputFile::create(path);
+    if (!file) return tl::unexpected(file.error());
+    video_.emplace(std::move(*file));
     std::vector<std::string> words = {options_.ffmpeg,
                                       "-y",
                                       "-loglevel",
@@ -111,7 +110,7 @@ Result<void> VideoOutput::start_ffmpeg() {
                                       "-i",
                                       "pipe:0"};
     words.insert(words.end(), format->words.begin(), format->words.end());
-    words.insert(words.end(), {"-f", format->name, "file:" + partial_.string()});
+    words.insert(words.end(), {"-f", format->name, "file:" + video_->written_at().string()});
     std::array<int, 2> ends{};
     if (::pipe2(ends.data(), O_CLOEXEC) != 0) return tl::unexpected(write_error("a pipe to ffmpeg", errno));
     // An ffmpeg that ends early is an error of write(), not the end of this program.
@@ -132,7 +131,7 @@ VideoOutput::VideoOutput(VideoOutput&& other) noexcept
     : options_(std::move(other.options_)),
       pictures_(std::move(other.pictures_)),
       written_(other.written_),
-      partial_(std::move(other.partial_)),
+      video_(std::move(other.video_)),
       pipe_(std::exchange(other.pipe_, -1)),
       ffmpeg_(std::exchange(other.ffmpeg_, 0)) {}
 
@@ -146,8 +145,6 @@ VideoOutput::~VideoOutput() {
     ::kill(ffmpeg_, SIGKILL);
     close_pipe();
     ends_well(ffmpeg_);
-    std::error_code ignored;
-    fs::remove(partial_, ignored);
 }
 
 Result<void> VideoOutput::write(const SmoothPicture& picture) {
@@ -170,13 +167,7 @@ Result<void> VideoOutput::write(const SmoothPicture& picture) {
 Result<void> VideoOutput::finish() {
     if (pictures_) return {};
     close_pipe();
-    const bool well = ends_well(std::exchange(ffmpeg_, 0));
-    std::error_code error;
-    if (well) fs::rename(partial_, options_.path, error);
-    if (well && !error) return {};
-    std::error_code ignored;
-    fs::remove(partial_, ignored);
-    if (well) return fail(ErrorKind::bad_input, options_.path + " cannot be written: " + error.message());
+    if (ends_well(std::exchange(ffmpeg_, 0))) return video_->finish();
     return fail(ErrorKind::bad_input, options_.path + ": ffmpeg could not make it; it says why above");
 }
 

@@ -5,12 +5,12 @@
 #include <sys/types.h>
 
 #include <cstddef>
-#include <filesystem>
 #include <optional>
 #include <string>
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "io/output_file.h"
 #include "io/sequence.h"
 #include "io/timestamps.h"
 #include "metrics/smooth_picture.h"
@@ -31,7 +31,7 @@ public:
     static Result<VideoOutput> open(const VideoOptions& options);
     VideoOutput(VideoOutput&& other) noexcept;
     VideoOutput& operator=(VideoOutput&&) = delete;
-    // Ends ffmpeg and removes its file unless finish() was called.
+    // Ends ffmpeg; its file is there only if finish() was called.
     ~VideoOutput();
 
     Result<void> write(const SmoothPicture& picture);
@@ -45,7 +45,7 @@ private:
     VideoOptions options_;
     std::optional<OutputNames> pictures_;  // of PNG files
     std::size_t written_ = 0;
-    std::filesystem::path partial_;  // the video until it is finished
+    std::optional<OutputFile> video_;  // into which ffmpeg writes
     int pipe_ = -1;
     pid_t ffmpeg_ = 0;
 };

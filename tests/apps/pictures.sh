@@ -210,6 +210,11 @@ touch broken
 expect 1 "ffmpeg could not make it" "$htvm" render squares -o bad.mp4 "${small[@]}" --ffmpeg ./ffmpeg
 expect 1 "ffmpeg ended early" "$htvm" render squares -o bad.mp4 --ffmpeg false
 expect 4 "give a folder or a pattern such as bad/%05d.png" "$htvm" render squares -o bad.mp4 --ffmpeg ./none
+rm words
+expect 1 "/proc/bad.mp4 cannot be written: " "$htvm" render squares -o /proc/bad.mp4 --ffmpeg ./ffmpeg
+mkdir folder.mp4
+expect 1 "folder.mp4 cannot be written: Is a directory" "$htvm" render squares -o folder.mp4 --ffmpeg ./ffmpeg
+[ ! -e words ] || fail "ffmpeg is asked for a video where none can be written"
 expect 1 "there is no folder nowhere" "$htvm" render squares -o nowhere/x.mp4 --ffmpeg ./ffmpeg
 expect 1 "must be even" "$htvm" render squares -o bad.mp4 --width 61 --ffmpeg ./ffmpeg
 expect 1 "cannot be transparent" "$htvm" render squares -o bad.mp4 --background transparent --ffmpeg ./ffmpeg
