@@ -21,7 +21,6 @@
 #include "command_line/manual.h"
 #include "command_line/option_text.h"
 #include "command_line/terminal.h"
-#include "command_line/visible.h"
 #include "core/edit_distance.h"
 #include "io/output_file.h"
 
@@ -147,9 +146,9 @@ std::string usage_message(const CLI::App* app, const CLI::Error& error) {
     for (const auto* named : app->get_subcommands()) {
         command += " " + named->get_name();
         chosen = named;
-        // The front page may lack the very option that was wrong.
-        if (const auto* all = named->get_option_no_throw("--help-all"); all && !all->get_group().empty())
-            help = "--help-all";
+        // The front page may lack the very option that was wrong; what is required is on it.
+        const auto* all = named->get_option_no_throw("--help-all");
+        if (error.get_name() != "RequiredError" && all && !all->get_group().empty()) help = "--help-all";
     }
     const auto unknown = unknown_flag(*chosen), said = in_words(*app, error);
     auto hint = unknown.starts_with("--") ? hint_at(*app, *chosen, unknown) : std::string();
@@ -210,9 +209,8 @@ bool names_no_command(const CLI::App& app, const std::string& word) {
 bool is_left_out(const Program& program, const std::string& word) { return program.may_be_left_out.contains(word); }
 
 void say_left_out(const Program& program, const std::string& word) {
-    fmt::print(stderr,
-               "{}: error: this {} was built without {}, so it has no command '{}'; docs/platforms.md tells more\n",
-               program.name, program.name, program.may_be_left_out.at(word), word);
+    tell_error(fmt::format("this {} was built without {}, so it has no command '{}'; docs/platforms.md tells more",
+                           program.name, program.may_be_left_out.at(word), word));
 }
 
 // "htvm 0.1.0", and in a second line what is missing.
@@ -235,7 +233,7 @@ void say_no_such_command(const Program& program, const CLI::App& app, const std:
                              : is_flag       ? fmt::format("did you mean --{}?", word)
                              : meant.empty() ? fmt::format("'{} --help' lists them", program.name)
                                              : fmt::format("did you mean '{}'?", meant);
-    fmt::print(stderr, "{}: error: there is no command '{}'; {}\n", program.name, word, hint);
+    tell_error(fmt::format("there is no command '{}'; {}", word, hint));
 }
 
 // "0 done, 1 bad input, ..."
@@ -272,8 +270,8 @@ std::vector<std::string> asked_words(const std::vector<std::string>& words) {
     return words.size() > 1 ? std::vector<std::string>{words[1], "--help"} : std::vector<std::string>{"--help"};
 }
 
-int exit_with(const Program& program, const Error& error) {
-    fmt::print(stderr, "{}: error: {}\n", program.name, visible_lines(error.message));
+int exit_with(const Error& error) {
+    tell_error(error.message);
     return interruption() != 0 ? 128 + interruption() : exit_code(error.kind);
 }
 
@@ -329,7 +327,7 @@ int run_program(const Program& program, int argc, char** argv) {
     }
     if (given.size() == 2 && given[0] == "--write-pages") {
         const auto written = write_pages(program, app, given[1]);
-        return written ? 0 : exit_with(program, written.error());
+        return written ? 0 : exit_with(written.error());
     }
     try {
         app.parse(std::vector<std::string>(words.rbegin(), words.rend()));  // as CLI11 wants them
@@ -340,12 +338,12 @@ int run_program(const Program& program, int argc, char** argv) {
     try {
         auto done = run();
         if (done) done = output_arrived();
-        return done ? 0 : exit_with(program, done.error());
+        return done ? 0 : exit_with(done.error());
     } catch (const std::bad_alloc&) {
-        fmt::print(stderr, "{}: error: out of memory\n", program.name);
+        tell_error("out of memory");
         return 5;
     } catch (const std::exception& error) {
-        fmt::print(stderr, "{}: error: {}\n", program.name, error.what());
+        tell_error(error.what());
         return 1;
     }
 }

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <system_error>
 
 #include "command_line/console.h"
 #include "command_line/visible.h"
@@ -19,17 +20,30 @@ long long now_ms() {
 std::string speaker = "htvm";
 bool quiet = false;
 
+void say(const std::string& text) {
+    try {
+        fmt::print(stderr, "{}", text);
+        std::fflush(stderr);
+    } catch (const std::system_error&) {  // told nobody
+    }
+}
+
+void say_line(const std::string& kind, const std::string& line) {
+    say(fmt::format("{}: {}{}\n", speaker, kind, visible_lines(line)));
+}
+
 }  // namespace
 
 void speak_as(const std::string& program) { speaker = program; }
 void quieten() { quiet = true; }
 void note(const std::string& line) {
-    if (!quiet) fmt::print(stderr, "{}: {}\n", speaker, visible_lines(line));
+    if (!quiet) say_line("", line);
 }
 void tell(const std::string& lines) {
-    if (!quiet) fmt::print(stderr, "{}", lines);
+    if (!quiet) say(lines);
 }
-void warn(const std::string& line) { fmt::print(stderr, "{}: warning: {}\n", speaker, visible_lines(line)); }
+void warn(const std::string& line) { say_line("warning: ", line); }
+void tell_error(const std::string& line) { say_line("error: ", line); }
 
 std::string counted(std::size_t count, const std::string& what) {
     return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
@@ -49,12 +63,11 @@ void Progress::step(const std::string& detail) {
     line += fmt::format("  {:.1f}/s", rate);
     if (total_ > done_ && rate > 0) line += fmt::format("  {:.0f} s left", static_cast<double>(total_ - done_) / rate);
     if (!detail.empty()) line += "  " + detail;
-    fmt::print(stderr, "\r\033[K{}", line);
-    std::fflush(stderr);
+    say("\r\033[K" + line);
 }
 
 Progress::~Progress() {
-    if (shown_) fmt::print(stderr, "\r\033[K");
+    if (shown_) say("\r\033[K");
 }
 
 }  // namespace htvm::app

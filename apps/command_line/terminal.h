@@ -1,4 +1,5 @@
-// What the programs tell the user: notes, warnings and progress, all on stderr, so that stdout is left for data.
+// What the programs tell the user: notes, warnings, errors and progress, all on stderr, so that stdout is left for
+// data. Where nobody can be told, as stderr is closed or its disk is full, the work goes on.
 #pragma once
 
 #include <cstddef>
@@ -12,6 +13,7 @@ void speak_as(const std::string& program);
 void quieten();
 void note(const std::string& line);
 void warn(const std::string& line);
+void tell_error(const std::string& line);
 // Lines of their own, as they are: a table.
 void tell(const std::string& lines);
 

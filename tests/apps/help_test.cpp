@@ -204,6 +204,8 @@ TEST(CommandLine, AContradictionIsAUsageErrorThatNamesTheOption) {
     ends_with({"publish", "ws://localhost:1/publish/a", "ws://localhost:1/publish/a"},
               "input: is a file or standard input; hubs come behind it");
     ends_with({"decode", "a.htvm", "-o", "-", "--json"}, "--json: prints on standard output, where -o - puts");
+    ends_with({"encode"}, "input is required; 'htvm encode --help' tells more");
+    ends_with({"encode", "capture"}, "--output is required; 'htvm encode --help' tells more");
     ends_with({"decode", "a.htvm"}, "-o: is required, or --audio for the sound alone");
     ends_with({"decode", "a.htvm", "--audio", "voice.txt"}, "--audio: 'voice.txt' does not end in one of");
     ends_with({"synth", "--live", "folder"}, "OUT_DIR: or --live: give one of them");

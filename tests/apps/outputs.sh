@@ -50,6 +50,13 @@ interrupt() { # interrupt SIGNAL CODE
 interrupt INT 130
 interrupt TERM 143
 
+# Nobody who can be told: the work is done all the same.
+rm -f untold.htvm
+"$htvm" encode capture -o untold.htvm 2>/dev/full && [ -e untold.htvm ] || fail "an encode whose notes are on a full disk fails"
+"$htvm" encode capture -o closed.htvm 2>&- && cmp -s untold.htvm closed.htvm || fail "an encode without a standard error fails"
+"$htvm" encode nowhere -o none.htvm 2>/dev/full
+[ $? -eq 1 ] || fail "an error on a full disk changes the exit code"
+
 # Done: in its place, under its own name alone, with the permissions of what was there; through a link.
 chmod 600 out.htvm
 ln -s out.htvm link.htvm
