@@ -266,8 +266,12 @@ Result<void> run_cut(const Options& options) {
 void add_cut(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("cut", "Copy some frames of an .htvm stream, without encoding them again");
-    command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
-    command->add_option("-o,--output", options->output, "The new stream: a file, or - for standard output")->required();
+    command->add_option("input", options->input, "The stream: a file, or - for standard input")
+        ->type_name("FILE")
+        ->required();
+    command->add_option("-o,--output", options->output, "The new stream: a file, or - for standard output")
+        ->type_name("FILE")
+        ->required();
     auto* first = command->add_option("--first", options->first, "First frame, counted from 0 (default: 0)");
     auto* frames =
         command->add_option("--frames", options->frames, "At most this many frames from there; 0: all (default: all)");

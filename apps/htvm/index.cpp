@@ -62,8 +62,10 @@ Result<void> run_index(const Options& options) {
 void add_index(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("index", "Write an index at the beginning of an .htvm file, for seeking");
-    command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
-    command->add_option("-o,--output", options->output, "Another file (default: in place)");
+    command->add_option("input", options->input, "The stream: a file, or - for standard input")
+        ->type_name("FILE")
+        ->required();
+    command->add_option("-o,--output", options->output, "Another file (default: in place)")->type_name("FILE");
     command->add_flag("--bounds", options->bounds, "Decode all frames for their bounds (default: only an index's own)");
     add_decoder_limits(*command, options->limits);
     command->footer(

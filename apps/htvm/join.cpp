@@ -69,8 +69,13 @@ Result<void> run_join(const Options& options) {
 void add_join(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("join", "Put .htvm streams one after the other, without encoding them again");
-    command->add_option("inputs", options->inputs, "The streams, in their order")->required()->expected(1, -1);
-    command->add_option("-o,--output", options->output, "The new stream: a file, or - for standard output")->required();
+    command->add_option("inputs", options->inputs, "The streams, in their order")
+        ->type_name("FILE")
+        ->required()
+        ->expected(1, -1);
+    command->add_option("-o,--output", options->output, "The new stream: a file, or - for standard output")
+        ->type_name("FILE")
+        ->required();
     add_audio_options(*command, options->audio);
     add_packet_limits(*command, options->limits);
     command->footer(

@@ -81,11 +81,13 @@ void add_pack(CLI::App& app, Run& run) {
         ->add_option("input", options->input,
                      "The stream: a file (.htvm, .mp4 or .m3u8), - for standard input, or a live one: "
                      "ws://HOST:PORT/watch/NAME")
+        ->type_name("FILE")
         ->required();
     command
         ->add_option("-o,--output", options->output,
                      "The new file, whose ending says of which kind it is: .mp4, .htvm or .m3u8, which is a playlist\n"
                      "of segments that are written beside it; or - for standard output")
+        ->type_name("FILE")
         ->required();
     auto* fragmented = command->add_flag("--fragmented", options->mp4.fragmented,
                                          "An .mp4 in fragments, each with the tables of its own samples");

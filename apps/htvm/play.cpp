@@ -262,6 +262,7 @@ void add_play(CLI::App& app, Run& run) {
             "input", options->inputs,
             "A stream (.htvm, .mp4 or .m3u8), a folder of streams, or a capture as htvm encode takes it (a folder, a "
             "pattern, meshes), which is encoded first")
+        ->type_name("FILE")
         ->expected(1, -1)
         ->required();
     auto* beside =

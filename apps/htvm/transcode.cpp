@@ -149,9 +149,13 @@ void add_transcode(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand(
         "transcode", "Code the pictures of a stream anew, for browsers that do not decode them as they are");
-    command->add_option("input", options->input, "The stream: a file (.htvm, .mp4 or .m3u8)")->required();
-    command->add_option("-o,--output", options->output,
-                        "The new stream (default: NAME.h264.htvm beside NAME.htvm, where the player looks for it)");
+    command->add_option("input", options->input, "The stream: a file (.htvm, .mp4 or .m3u8)")
+        ->type_name("FILE")
+        ->required();
+    command
+        ->add_option("-o,--output", options->output,
+                     "The new stream (default: NAME.h264.htvm beside NAME.htvm, where the player looks for it)")
+        ->type_name("FILE");
     add_choice(*command, "--texture-codec", options->coder, coders,
                "h264 (default), which the program ffmpeg codes by its libx264; vp9; or av1");
     command
@@ -160,7 +164,8 @@ void add_transcode(CLI::App& app, Run& run) {
                      "new coder needs for it)")
         ->check(CLI::Range(0.0, 100.0))
         ->type_name("NUMBER");
-    command->add_option("--ffmpeg", options->ffmpeg, "The ffmpeg program (default: ffmpeg, found as the shell does)");
+    command->add_option("--ffmpeg", options->ffmpeg, "The ffmpeg program (default: ffmpeg, found as the shell does)")
+        ->type_name("FILE");
     add_packet_limits(*command, options->limits);
     command->footer(
         "Meshes and sound are copied, byte for byte. H.264 is for browsers alone: 'htvm decode', 'still' and 'render'\n"

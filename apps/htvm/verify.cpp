@@ -313,7 +313,9 @@ void add_verify(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command =
         app.add_subcommand("verify", "Check an .htvm stream: checksums, order, references, index, decoding");
-    command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
+    command->add_option("input", options->input, "The stream: a file, or - for standard input")
+        ->type_name("FILE")
+        ->required();
     command->add_option("--threads", options->threads, "Threads (default: one per core)");
     command->add_flag("--json", options->json, "Print the result as JSON on standard output");
     add_decoder_limits(*command, options->limits);

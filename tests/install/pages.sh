@@ -40,7 +40,7 @@ has_options() {
         checks=$((checks + 1))
     done
 }
-for command in synth encode decode info calibrate compare cut join pack index verify still render play publish serve link; do has_options "$htvm" $command htvm; done
+for command in synth encode decode info calibrate compare cut join pack transcode index verify still render play demo publish serve link; do has_options "$htvm" $command htvm; done
 for command in rd decoding reproduce events endure bake; do has_options "$lab" $command htvm-lab; done
 [ $checks -gt 100 ] || fail "only $checks checks: the help was not read"
 grep -q '^\.SH EXAMPLES' man1/htvm-encode.1 || fail "no examples"
@@ -75,6 +75,7 @@ offers '--quality|--quiet' 'htvm encode --q'
 offers '' 'htvm encode --quality '
 offers 'a b.htvm' 'htvm decode a'
 offers 'person.htvm' 'htvm decode -o out p'
+for command in cut join pack transcode index verify play; do offers 'person.htvm' "htvm $command p"; done
 offers 'capture' 'htvm synth -o c'
 offers 'animate|gap' 'htvm decode a.htvm --conceal '
 offers 'flat|smooth|unlit' 'htvm compare a b --shading '
