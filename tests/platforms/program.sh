@@ -107,6 +107,18 @@ mkdir "$work/piped"
 for one in piped.here piped; do "$here" decode "$work/$one.htvm" -o "$work/piped/$one/" --quiet; done
 diff -r "$work/piped/piped.here" "$work/piped/piped" || fail "meshes come by a pipe"
 
+# Bytes go in and out as they are, those of ends of lines and of files among them.
+LC_ALL=C grep -qaP '\x1a' "$work/tracked.htvm" && LC_ALL=C grep -qaP '\r' "$work/tracked.htvm" ||
+    fail "the stream has bytes that a text has not"
+"${server[@]}" cut - -o - <"$work/tracked.htvm" >"$work/through.htvm" 2>/dev/null
+"$here" cut - -o - <"$work/tracked.htvm" >"$work/through.here.htvm" 2>/dev/null
+cmp "$work/through.here.htvm" "$work/through.htvm" || fail "a stream goes through standard input and output"
+if [ "$platform" = windows ]; then
+    "$here" synth "$work/longer" --frames 60 --vertices 1500 --quiet
+    tests/platforms/console.py "$PWD/build/wine" build/windows/htvm.exe "$work/longer" "$work/console.htvm" "$here"
+    seen+="; progress and Ctrl-C at a console"
+fi
+
 # The page, the player and the stream, as a browser fetches them.
 "${there[@]}" demo -o "$work/demo.htvm"
 cmp "$work/demo.htvm" apps/htvm/demo/person.htvm || fail "the stream of the demonstration is inside"
