@@ -94,9 +94,9 @@ void add_times(CLI::App& command, CaptureOptions& options) {
 }
 
 void add_size(CLI::App& command, CaptureOptions& options) {
-    add_choice(command, "--unit", options.unit, units_or("auto"),
-               "Unit of the mesh files: mm, cm, dm, m, in or ft (default: mm, cm or m, guessed from the first mesh's\n"
-               "size; m for glTF)")
+    add_unit(command, options.unit, "auto",
+             "Unit of the mesh files: mm, cm, dm, m, in or ft (default: mm, cm or m, guessed from the first mesh's\n"
+             "size; m for glTF)")
         ->group(heading::input);
     auto* scale =
         command
@@ -119,10 +119,11 @@ void add_size(CLI::App& command, CaptureOptions& options) {
 
 }  // namespace
 
-std::vector<Choice<std::optional<LengthUnit>>> units_or(const char* none) {
-    std::vector<Choice<std::optional<LengthUnit>>> out = {{none, std::nullopt}};
-    for (const auto& unit : length_units) out.push_back({unit.symbol, unit.unit});
-    return out;
+CLI::Option* add_unit(CLI::App& command, std::optional<LengthUnit>& unit, const char* none,
+                      const std::string& meaning) {
+    std::vector<Choice<std::optional<LengthUnit>>> choices = {{none, std::nullopt}};
+    for (const auto& known : length_units) choices.push_back({known.symbol, known.unit});
+    return add_choice(command, "--unit", unit, choices, meaning, meant_unit);
 }
 
 void add_capture_options(CLI::App& command, CaptureOptions& options) {
@@ -174,6 +175,13 @@ void add_texture_options(CLI::App& command, TextureOptions& options) {
 bool keeps_pictures(TextureAs use) {
     return use == TextureAs::picture || use == TextureAs::projection || use == TextureAs::captured ||
            use == TextureAs::keep;
+}
+
+std::string all_empty(const CaptureOptions& options, std::size_t frames) {
+    const auto input = is_piped(options) ? "standard input" : input_name(options);
+    return frames == 1
+               ? input + " has no vertices: see that it holds a mesh"
+               : fmt::format("none of the {} frames of {} has a vertex: see that they are meshes", frames, input);
 }
 
 bool is_piped(const CaptureOptions& options) { return options.inputs == std::vector<std::string>{"-"}; }
@@ -370,21 +378,24 @@ Result<std::optional<TexturedMesh>> Capture::read_next_file() {
 // Reads the first mesh that can be read and has vertices.
 Result<void> Capture::find_first() {
     std::optional<Error> error;
+    bool serves = false;
     millimetres_per_unit_ = 1;
     for (std::size_t end = begin_ + frames_;;) {
         auto mesh = pipe_ ? read_pipe() : read_next_file();
         if (mesh && !*mesh) break;
         if (!mesh && !error) error = mesh.error();
-        const bool serves = mesh && !(*mesh)->mesh.positions.empty();
+        serves = mesh && !(*mesh)->mesh.positions.empty();
         if (mesh && (serves || !peeked_)) {
             peeked_ = std::move(**mesh);
             peeked_at_ = *at_;
         }
         if (pipe_ || serves || next_ == end) break;
     }
-    if (!peeked_ && error) return tl::unexpected(*error);
+    if (error && (!peeked_ || !(serves || pipe_))) return tl::unexpected(*error);
     if (!peeked_)
         return fail(ErrorKind::bad_input, "there is no mesh in " + (pipe_ ? "standard input" : input_name(options_)));
+    // What follows on standard input is not known yet.
+    if (!serves && !pipe_) return fail(ErrorKind::bad_input, all_empty(options_, frames_));
     return look_for_images();
 }
 

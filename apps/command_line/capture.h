@@ -28,7 +28,8 @@
 
 namespace CLI {
 class App;
-}
+class Option;
+}  // namespace CLI
 
 namespace htvm::app {
 
@@ -53,8 +54,8 @@ inline constexpr std::array up_axes = {
     Choice<UpAxis>{"-y", UpAxis::minus_y}, Choice<UpAxis>{"z", UpAxis::plus_z},   Choice<UpAxis>{"-z", UpAxis::minus_z},
 };
 
-// The units of length by their symbols, behind a word for none of them.
-std::vector<Choice<std::optional<LengthUnit>>> units_or(const char* none);
+// Adds --unit, which takes a unit of length by its symbol, or a word for none of them.
+CLI::Option* add_unit(CLI::App& command, std::optional<LengthUnit>& unit, const char* none, const std::string& meaning);
 
 struct CaptureOptions {
     // A folder, pattern, glob or file of meshes; several files; or - for PLY after PLY on standard input.
@@ -100,6 +101,9 @@ bool is_piped(const CaptureOptions& options);
 
 // What was named, for people: of several files, their folder.
 std::string input_name(const CaptureOptions& options);
+
+// Of a capture whose frames are all without vertices, for people.
+std::string all_empty(const CaptureOptions& options, std::size_t frames);
 
 // All that frames depend on besides the files, for names of kept results.
 std::string key_of(const CaptureOptions& options);

@@ -114,11 +114,7 @@ void add_sequences(CLI::App& command, ComparisonRequest& o) {
         ->required();
     command.add_option("--frames", o.frames, "Compare at most this many frames; 0: all (default: all)")
         ->group(heading::input);
-    constexpr std::array<Choice<std::optional<LengthUnit>>, 4> units = {{{"auto", std::nullopt},
-                                                                         {"mm", LengthUnit::millimetre},
-                                                                         {"cm", LengthUnit::centimetre},
-                                                                         {"m", LengthUnit::metre}}};
-    add_choice(command, "--unit", o.unit, units, "Unit of the files: mm, cm, m, or auto (by the first frame's size)")
+    add_unit(command, o.unit, "auto", "Unit of the files: mm, cm, dm, m, in, ft, or auto (by the first frame's size)")
         ->default_str("auto")
         ->group(heading::input);
     command

@@ -590,8 +590,8 @@ void add_formats(CLI::App& command, Options& options) {
                "Format of the pictures of a texture, which go beside the meshes, or into a .glb: png (default) or\n"
                "jpeg. Image files that were kept (encode --texture-as keep) stay as they are")
         ->group(heading::output);
-    add_choice(command, "--unit", options.unit, units_or("capture"),
-               "Unit of the positions: the capture's (default; metres for .glb), mm, cm, dm, m, in or ft")
+    add_unit(command, options.unit, "capture",
+             "Unit of the positions: the capture's (default; metres for .glb), mm, cm, dm, m, in or ft")
         ->group(heading::output);
     add_choice(command, "--conceal", options.conceal, conceal_uses,
                "What to write for a lost frame: gap (default), nothing, and the numbers continue; or animate,\n"

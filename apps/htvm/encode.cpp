@@ -64,6 +64,17 @@ nlohmann::json json_of(const std::vector<ListedFrame>& list) {
     return out;
 }
 
+// Why frames say what of the surface is there, and what follows.
+std::string presence_text(internal::Openness first) {
+    using enum internal::Openness;
+    const auto* why = first == bordered    ? "the first mesh has borders, as where depth cameras see a person: "
+                      : first == in_pieces ? "the first mesh is in pieces, as where depth cameras see a person: "
+                                           : "";
+    return std::string(why) +
+           "frames say what is there, holes that open for a moment are filled, specks are left out (--presence, "
+           "--fill-holes, --specks)";
+}
+
 void report(const EncodePlan& plan, const Summary& summary, const RateReport& rate, std::uint64_t bytes, double fps,
             std::size_t dropped_late, const Publishing* hub = nullptr, const Deadline* deadline = nullptr) {
     const auto frames = summary.totals.all().frames;
@@ -89,11 +100,7 @@ void report(const EncodePlan& plan, const Summary& summary, const RateReport& ra
         fmt::print("{}\n", out.dump(2));
     } else {
         tell(layer_table(summary.totals) + reasons_text(summary.totals));
-        if (summary.totals.all().bytes[Layer::presence] > 0)
-            note(
-                "the first mesh has borders, or is in pieces, as where depth cameras see a person: frames say what "
-                "is there, holes that open for a moment are filled, specks are left out (--presence, --fill-holes, "
-                "--specks)");
+        if (summary.totals.all().bytes[Layer::presence] > 0) note(presence_text(summary.first_surface));
         note(fmt::format("{}: {}, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s",
                          shown_place(plan.output.place), counted(frames, "frame"), bytes, megabits / seconds, fps,
                          static_cast<double>(frames) / summary.encode_seconds));
@@ -205,6 +212,7 @@ Result<void> encode_in_groups(const EncodePlan& plan, Capture& capture, const En
                    ? done
                    : fail(done.error().kind, fmt::format("{}; nothing is written", done.error().message));
     if (summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
+    // All frames of a job may be empty, though the capture is not.
     if (summary.bounds) output->add_bounds(*summary.bounds);
     if (auto finished = output->finish(); !finished) return finished;
     report(plan, summary, rate, output->bytes(), capture.fps(), 0);
@@ -316,8 +324,8 @@ bool goes_on(const Passes& passes, int number, const Outcome& outcome, const Str
 // The end of the last pass: the stream and the log are there, and all is told.
 Result<void> conclude(const Passes& passes, const Outcome& outcome, StreamOutput& output) {
     const auto& [summary, rate, deadline] = outcome;
-    if (summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
-    if (summary.bounds) output.add_bounds(*summary.bounds);
+    if (auto something = check_something_was_coded(passes.plan, summary); !something) return something;
+    output.add_bounds(*summary.bounds);
     if (auto finished = output.finish(); !finished) return finished;
     report(passes.plan, summary, rate, output.bytes(), passes.capture.fps(), passes.capture.dropped(),
            output.publishing(), passes.are_timed() ? &deadline : nullptr);

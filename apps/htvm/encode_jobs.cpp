@@ -189,6 +189,7 @@ Result<void> encode_groups(const EncodePlan& plan, const EncoderOptions& setting
     const auto start = std::chrono::steady_clock::now();
     const auto pose = capture.first_pose() ? std::optional(*capture.first_pose()) : std::nullopt;
     const auto mesh = capture.take_first();
+    summary.first_surface = internal::openness_of(mesh.positions, mesh.triangles);
     std::size_t frames = 0;
     for (const auto& group : groups) frames += group.count();
     const auto of_machine = internal::thread_count(settings.threads);

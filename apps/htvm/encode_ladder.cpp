@@ -221,8 +221,8 @@ Result<void> conclude(std::deque<Work>& works, const std::string& place, double 
     std::vector<PlaylistVariant> variants;
     auto json = nlohmann::json::array();
     for (auto& work : works) {
-        if (work.summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
-        if (work.summary.bounds) work.output->add_bounds(*work.summary.bounds);
+        if (auto something = check_something_was_coded(work.plan, work.summary); !something) return something;
+        work.output->add_bounds(*work.summary.bounds);
         if (auto finished = work.output->finish(); !finished) return finished;
         auto variant = on_hub ? published_variant(work, fps) : variant_of(work, fps);
         if (!variant) return tl::unexpected(variant.error());

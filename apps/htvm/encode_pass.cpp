@@ -287,6 +287,7 @@ Result<void> take_bad(Pass& pass, const Error& error) {
 Result<void> check_triangles(Pass& pass, const Mesh& mesh) {
     auto& summary = pass.summary;
     if (!mesh.triangles.empty()) {
+        if (!pass.saw_triangles) summary.first_surface = internal::openness_of(mesh.positions, mesh.triangles);
         pass.saw_triangles = true;
         return {};
     }
@@ -342,6 +343,13 @@ void add(Summary& summary, Summary behind) {
     summary.pictures.bytes += behind.pictures.bytes;
     summary.pictures.seconds += behind.pictures.seconds;
     summary.pictures.baking_seconds += behind.pictures.baking_seconds;
+}
+
+Result<void> check_something_was_coded(const EncodePlan& plan, const Summary& summary) {
+    const auto frames = summary.totals.all().frames;
+    if (frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
+    if (!summary.bounds) return fail(ErrorKind::bad_input, all_empty(plan.capture, frames));
+    return {};
 }
 
 void FrameWarnings::tell(Kind kind, const std::string& line) {

@@ -18,6 +18,7 @@
 #include "htvm/encoder.hpp"
 #include "picture_track.h"
 #include "rate_report.h"
+#include "surface/open_border.h"
 
 namespace htvm::app {
 
@@ -31,6 +32,8 @@ struct Summary {
     TotalsByType totals;
     double encode_seconds = 0;
     std::size_t without_triangles = 0;
+    // The first mesh that has triangles.
+    internal::Openness first_surface = internal::Openness::closed;
     // The capture's frames, coded or not: how many, and the times of the first and the last.
     std::size_t frames = 0;
     std::int64_t first_us = 0, last_us = 0;
@@ -92,6 +95,9 @@ Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const 
 
 // A pass whose packets go to the hub asks it for key frames, and follows its line.
 void follow_hub(Pass& pass, Publishing& hub);
+
+// bad_input where nothing was coded, or nothing but frames without vertices; of a whole capture.
+Result<void> check_something_was_coded(const EncodePlan& plan, const Summary& summary);
 
 // Ends with an error of any kind where it is stopped.
 Result<void> encode_frames(Pass& pass);

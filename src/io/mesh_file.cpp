@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/edit_distance.h"
 #include "core/letter_case.h"
 #include "io/drc.h"
 #include "io/gltf.h"
@@ -178,7 +179,22 @@ Result<LengthUnit> length_unit(std::string_view symbol) {
         if (symbol == unit.symbol) return unit.unit;
         symbols += (symbols.empty() ? "" : ", ") + std::string(unit.symbol);
     }
-    return fail(ErrorKind::bad_input, "the unit '" + std::string(symbol) + "' is not one of " + symbols);
+    const auto meant = meant_unit(symbol);
+    return fail(ErrorKind::bad_input, "the unit '" + std::string(symbol) + "' is not one of " + symbols +
+                                          (meant.empty() ? "" : "; did you mean " + meant + "?"));
+}
+
+std::string meant_unit(std::string_view typed) {
+    const auto word = internal::lower_case(typed.substr(0, 100));
+    std::vector<std::string> symbols, names;
+    for (const auto& unit : length_units) {
+        symbols.emplace_back(unit.symbol);
+        names.emplace_back(unit.name);
+    }
+    // "meter" is as near to "metres" as a mistyped word may be.
+    const auto name = std::ranges::find(names, internal::meant_word(word, names));
+    if (word.size() > 3 && name != names.end()) return symbols[static_cast<std::size_t>(name - names.begin())];
+    return internal::meant_word(word, symbols);
 }
 
 std::optional<SpaceBounds> surface_bounds(const Mesh& mesh) {

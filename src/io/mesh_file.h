@@ -76,8 +76,10 @@ inline constexpr std::array length_units = {
 
 constexpr const LengthUnitNames& names_of(LengthUnit unit) { return length_units[static_cast<std::size_t>(unit)]; }
 constexpr double millimetres_per(LengthUnit unit) { return names_of(unit).millimetres; }
-// bad_input names the symbols that there are.
+// bad_input names the symbols that there are, and the one that was meant.
 Result<LengthUnit> length_unit(std::string_view symbol);
+// The symbol of the unit that somebody may mean who writes it otherwise: "m" for "meter" or "M". Empty: nobody knows.
+std::string meant_unit(std::string_view typed);
 
 // The box of the vertices that triangles use; of all where there are none. Scanners leave unused ones at the origin.
 std::optional<SpaceBounds> surface_bounds(const Mesh& mesh);

@@ -97,6 +97,18 @@ for i in 0 1 2 3 4 5; do # tetrahedra
 done >pieces.obj
 expect 0 "  surface      in pieces, as where depth cameras see a person" "$htvm" check pieces.obj --trial 0
 expect 0 "  border       0.00 m" "$htvm" check pieces.obj --trial 0
+mkdir pieces open
+for number in 0 1 2; do
+    head -n $((48 - 8 * (number > 0))) pieces.obj >pieces/$number.obj # one of the six goes
+    sed '/^f -3 -2 -1/d' pieces.obj >open/$number.obj
+done
+for way in "" "--chunks 1"; do
+    # shellcheck disable=SC2086
+    {
+        expect 0 "the first mesh is in pieces, as where depth cameras see a person: frames say" "$htvm" encode pieces $way -o pieces.htvm
+        expect 0 "the first mesh has borders, as where depth cameras see a person: frames say" "$htvm" encode open $way -o open.htvm
+    }
+done
 
 # A stream under another format's name.
 for name in x.glb x.mkv x.wav x.PNG x.zip; do

@@ -47,6 +47,20 @@ done
 expect 0 "1 bad frame left out" piped odd --on-bad-frame skip -o x.htvm
 expect 1 "(--on-bad-frame skip goes on without such frames)" piped far -o x.htvm
 expect 0 "1 of 6 frames has no triangles" piped odd -o x.htvm
+# A capture of nothing but empty frames is no capture, whoever reads it.
+mkdir empty
+for number in 0 1 2; do echo "# nothing" >empty/frame_$number.obj; done
+for command in "encode empty -o empty.htvm" "encode empty --profile topology -o empty.htvm" "encode empty --jobs 2 -o empty.htvm" "check empty"; do
+    # shellcheck disable=SC2086
+    expect 1 "none of the 3 frames of empty has a vertex: see that they are meshes" "$htvm" $command
+done
+expect 1 "empty/frame_0.obj has no vertices: see that it holds a mesh" "$htvm" encode empty/frame_0.obj -o empty.htvm
+echo nonsense >empty/frame_3.obj
+expect 1 "frame_3.obj" "$htvm" encode empty/frame_[03].obj --on-bad-frame skip -o empty.htvm
+nothing=$(printf 'ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n_')
+expect 1 "none of the 2 frames of standard input has a vertex" bash -c "printf '%s' '${nothing%_}' '${nothing%_}' | '$htvm' encode - -o empty.htvm"
+expect 0 "1 of 7 frames has no triangles" bash -c "{ printf '%s' '${nothing%_}'; cat capture/*.ply; } | '$htvm' encode - -o x.htvm"
+[ -z "$(ls empty.htvm* 2>/dev/null)" ] || fail "a capture of empty frames leaves $(ls empty.htvm*)"
 expect 1 "mesh 1 of the stream: this is not a PLY file: it does not begin with a line \"ply\" (--on-bad-frame skip goes on behind meshes that came whole, which is not known of this one)" \
     bash -c "cat capture/frame_00000.ply bad/frame_00003.ply | '$htvm' encode - --on-bad-frame skip -o x.htvm"
 # What cannot be written is no bad frame.
@@ -118,6 +132,9 @@ for k in 0 1 3 4; do cp capture/frame_0000$k.ply tenths/${k}0.ply; done
 has_times tenths.htvm 0 33 100 133
 
 # Units: the guess says what it makes of the subject, and others can be named.
+expect 2 "meter is none of auto, mm, cm, dm, m, in, ft; did you mean m?" "$htvm" encode capture --unit meter -o x.htvm
+expect 2 "did you mean in?" "$htvm" compare capture x.htvm --unit inches
+expect 2 "did you mean mm?" "$htvm" decode x.htvm --unit Millimeters -o x
 expect 0 "unit_mm\": 25.4" bash -c "'$htvm' encode capture --unit in -o x.htvm --quiet && '$htvm' info --json x.htvm"
 "$htvm" encode capture -o plain.htvm --quiet
 "$htvm" decode plain.htvm -o dm --unit dm --quiet

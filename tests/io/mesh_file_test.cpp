@@ -96,6 +96,17 @@ TEST_F(MeshFile, AFileAboveTheLimitIsNotRead) {
     EXPECT_EQ(bytes.error().kind, ErrorKind::limit);
 }
 
+TEST(MeantUnit, KnowsUnitsByTheirNamesInAnySpelling) {
+    for (const auto* typed : {"meter", "metre", "meters", "Metres", "M"}) EXPECT_EQ(meant_unit(typed), "m") << typed;
+    for (const auto* typed : {"millimeter", "millimetres", "MM"}) EXPECT_EQ(meant_unit(typed), "mm") << typed;
+    for (const auto* typed : {"centimeters", "centimetre", "cms"}) EXPECT_EQ(meant_unit(typed), "cm") << typed;
+    for (const auto* typed : {"inch", "inches"}) EXPECT_EQ(meant_unit(typed), "in") << typed;
+    for (const auto* typed : {"foot", "feet"}) EXPECT_EQ(meant_unit(typed), "ft") << typed;
+    for (const auto* typed : {"", "parsec", "light years"}) EXPECT_EQ(meant_unit(typed), "") << typed;
+    EXPECT_EQ(length_unit("meter").error().message,
+              "the unit 'meter' is not one of mm, cm, dm, m, in, ft; did you mean m?");
+}
+
 TEST(GuessUnit, GoesByTheDiagonalOfTheBoundingBox) {
     const auto of = [](float x, float y, float z) {
         Mesh mesh;
