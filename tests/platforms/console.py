@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What somebody sees and does at the console of a program that Wine runs: console.py PREFIX HTVM_EXE CAPTURE OUTPUT HERE
 
-Encodes a capture in a console, a second time with Ctrl-C once the first frame is coded. OUTPUT must not be there; HERE
+Encodes a capture in a console, a second time with Ctrl-C once the first frame is coded, and plays the stream. OUTPUT must not be there; HERE
 is this machine's own htvm, which reads what is written. Wine makes a terminal the console of the program that is
 started in it.
 """
@@ -9,11 +9,14 @@ started in it.
 import os
 import pty
 import re
+import select
 import shutil
+import signal
 import subprocess
 import sys
 
 CTRL_C = b"\x03"
+SILENCE = 120  # seconds without a word, after which a program hangs
 
 
 def at_console(words: list[str], press_at: bytes = b"") -> tuple[bytes, int]:
@@ -23,6 +26,9 @@ def at_console(words: list[str], press_at: bytes = b"") -> tuple[bytes, int]:
         os.execvp(words[0], words)
     said = b""
     while True:
+        if not select.select([terminal], [], [], SILENCE)[0]:
+            os.kill(process, signal.SIGKILL)
+            sys.exit(f"not so: {' '.join(words)} goes on\n{said!r}")
         try:
             piece = os.read(terminal, 65536)
         except OSError:  # so a terminal ends
@@ -68,6 +74,9 @@ def main() -> None:
     frames = subprocess.run([here, "verify", output + ".partial"], capture_output=True, text=True)
     check(frames.returncode == 0 and f": {left[1]} frame" in frames.stdout,
           f"what Ctrl-C leaves is a whole stream of {left[1]} frames: {frames.stdout}{frames.stderr}", said)
+
+    said, code = at_console([wine, program, "play", output, "--no-open"], press_at=rb"Ctrl-C ends\.")
+    check(code == 0, f"who has seen enough ends play by Ctrl-C with 0, not with {code}", said)
 
 
 main()

@@ -1,6 +1,8 @@
 #include <atomic>
 #include <cmath>
+#include <condition_variable>
 #include <limits>
+#include <mutex>
 #include <string>
 
 #include "codec/tracked/vertex_field_walk.h"
@@ -189,22 +191,29 @@ bool quantise_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<con
     return false;
 }
 
-// How far the planning of a component is, for the one that looks at its rests.
+// How far the planning of a component is, for the one that looks at its rests. Not by std::atomic::wait(): that of
+// libstdc++ 12 misses who comes just then where there are no futexes, as on Windows, and waits for ever.
 class Progress {
 public:
     static constexpr std::size_t everything = std::numeric_limits<std::size_t>::max();
     void reach(std::size_t levels) {
-        levels_.store(levels, std::memory_order_release);
-        levels_.notify_all();
+        {
+            const std::lock_guard lock(mutex_);
+            levels_.store(levels, std::memory_order_release);
+        }
+        reached_.notify_all();
     }
     void await(std::size_t levels) const {
-        for (std::size_t now = levels_.load(std::memory_order_acquire); now < levels;
-             now = levels_.load(std::memory_order_acquire))
-            levels_.wait(now, std::memory_order_acquire);
+        const auto is_there = [&] { return levels_.load(std::memory_order_acquire) >= levels; };
+        if (is_there()) return;
+        std::unique_lock lock(mutex_);
+        reached_.wait(lock, is_there);
     }
 
 private:
     std::atomic<std::size_t> levels_{0};
+    mutable std::mutex mutex_;
+    mutable std::condition_variable reached_;
 };
 
 // Lets those who wait go on, however a component's planning ends.
