@@ -26,7 +26,7 @@ struct Program {
     std::string description;  // one sentence, at the top of --help
     std::string footer;       // at the end of --help, after the exit codes; may be empty
     std::vector<AddCommand> commands;
-    std::map<std::string, std::string> elsewhere = {};  // commands of another program, and what to type for them
+    std::map<std::string, std::string> elsewhere = {};  // what is no command here, and what to type in its place
     std::vector<std::string> built_without = {};        // abilities that were left out, for --version
     std::map<std::string, std::string> may_be_left_out =
         {};                      // commands, and the ability without which they are missing

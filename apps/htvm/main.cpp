@@ -16,7 +16,9 @@ int main(int argc, char** argv) {
     add(picture_commands());
     add({add_play, add_demo});
     add(live_commands());
-    program.elsewhere = {{"rd", "htvm-lab rd"}, {"reproduce", "htvm-lab reproduce"}};
+    program.elsewhere = {{"rd", "htvm-lab rd"},  {"reproduce", "htvm-lab reproduce"}, {"compress", "htvm encode"},
+                         {"live", "htvm serve"}, {"decompress", "htvm decode"},       {"view", "htvm play"},
+                         {"watch", "htvm play"}};
     program.built_without = left_out_abilities();
     program.may_be_left_out = {
         {"still", "image files"},  {"render", "image files"},   {"transcode", "pictures of textures"},

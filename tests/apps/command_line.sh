@@ -104,6 +104,7 @@ expect 2 "there is no command 'nonsense'" "$htvm" nonsense
 expect 2 "did you mean 'encode'?" "$htvm" enocde capture
 expect 2 "did you mean --quality?" "$htvm" encode capture --qualty 50 -o x.htvm
 expect 2 "it is 'htvm-lab rd'" "$htvm" rd capture -o x
+expect 2 "it is 'htvm serve'" "$htvm" live
 expect 2 "it is 'htvm-lab reproduce'" "$htvm" reproduce --help
 expect 2 "--quality: 200 is not in 0 to 100" "$htvm" encode capture -q 200 -o x.htvm
 expect 2 "--quality: abc is not a number" "$htvm" encode capture -q abc -o x.htvm
