@@ -75,7 +75,7 @@ else
 fi
 
 wheels=0
-for library in build/{package,release,aarch64,windows}/python/{libhtvm.so,libhtvm.dll}; do
+for library in build/{package,aarch64,windows}/python/{libhtvm.so,libhtvm.dll}; do
     [ -f "$library" ] || continue
     python3 -B python/htvm_wheel.py "$library" "$out" >/dev/null
     wheels=$((wheels + 1))

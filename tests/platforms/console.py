@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""What somebody sees and does at the console of a program that Wine runs: console.py PREFIX HTVM_EXE CAPTURE OUTPUT HERE
+"""What somebody sees and does at the console of a program that Wine runs: console.py PREFIX HTVM_EXE CAPTURE OUTPUT HERE FEED_EXE
 
-Encodes a capture in a console, a second time with Ctrl-C once the first frame is coded, and plays the stream. OUTPUT must not be there; HERE
-is this machine's own htvm, which reads what is written. Wine makes a terminal the console of the program that is
-started in it.
+Encodes a capture of PLY files at a console, again with Ctrl-C once twenty are on their way, and plays the stream.
+OUTPUT must not be there; HERE is this machine's own htvm, which reads what is written; FEED_EXE is feed.cpp. Wine makes
+a terminal the console of the program that is started in it.
 """
 
 import os
+import pathlib
 import pty
 import re
 import select
@@ -51,9 +52,13 @@ def check(is_so: bool, what: str, said: bytes) -> None:
 
 
 def main() -> None:
-    prefix, program, capture, output, here = sys.argv[1:]
+    prefix, program, capture, output, here, feed = sys.argv[1:]
     wine = shutil.which("wine64") or "/usr/lib/wine/wine64"
     os.environ.update(WINEPREFIX=prefix, WINEDEBUG="-all", LC_ALL="C.UTF-8", TERM="xterm")
+    meshes = output + ".ply"
+    with open(meshes, "wb") as all_meshes:
+        for file in sorted(pathlib.Path(capture).glob("*.ply")):
+            all_meshes.write(file.read_bytes())
     encode = [wine, program, "encode", capture, "-o", output]
 
     said, code = at_console(encode)
@@ -65,15 +70,19 @@ def main() -> None:
     check(" frames/s" in text_of(said), "the last line says what was done", said)
     whole = open(output, "rb").read()
 
-    said, code = at_console(encode, press_at=rb"encoding \d")
-    check(code == 130, f"Ctrl-C ends with 130, not with {code}", said)
-    left = re.search(r"interrupted; (\d+) frames? (was|were) encoded before, now in .*\.partial, which is a whole stream",
-                     text_of(said))
-    check(left is not None, "who presses Ctrl-C is told what is left", said)
-    check(open(output, "rb").read() == whole, "Ctrl-C leaves the file that was there", said)
-    frames = subprocess.run([here, "verify", output + ".partial"], capture_output=True, text=True)
-    check(frames.returncode == 0 and f": {left[1]} frame" in frames.stdout,
-          f"what Ctrl-C leaves is a whole stream of {left[1]} frames: {frames.stdout}{frames.stderr}", said)
+    # From files, and from a rig's pipe that has sent all of them and may send more.
+    live = [wine, feed, meshes, program, "encode", "-", "-o", output]
+    for words in (encode, live):
+        said, code = at_console(words, press_at=rb"encoding [2-5]\d\b")
+        check(code == 130, f"Ctrl-C ends with 130, not with {code}", said)
+        left = re.search(r"interrupted; (\d+) frames? (was|were) encoded before, now in .*\.partial, which is a whole "
+                         "stream", text_of(said))
+        check(left is not None, "who presses Ctrl-C is told what is left", said)
+        check(open(output, "rb").read() == whole, "Ctrl-C leaves the file that was there", said)
+        frames = subprocess.run([here, "verify", output + ".partial"], capture_output=True, text=True)
+        check(frames.returncode == 0 and f": {left[1]} frame" in frames.stdout,
+              f"what Ctrl-C leaves is a whole stream of {left[1]} frames: {frames.stdout}{frames.stderr}", said)
+        os.remove(output + ".partial")
 
     said, code = at_console([wine, program, "play", output, "--no-open"], press_at=rb"Ctrl-C ends\.")
     check(code == 0, f"who has seen enough ends play by Ctrl-C with 0, not with {code}", said)

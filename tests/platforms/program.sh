@@ -115,7 +115,8 @@ LC_ALL=C grep -qaP '\x1a' "$work/tracked.htvm" && LC_ALL=C grep -qaP '\r' "$work
 cmp "$work/through.here.htvm" "$work/through.htvm" || fail "a stream goes through standard input and output"
 if [ "$platform" = windows ]; then
     "$here" synth "$work/longer" --frames 60 --vertices 1500 --quiet
-    tests/platforms/console.py "$PWD/build/wine" build/windows/htvm.exe "$work/longer" "$work/console.htvm" "$here"
+    x86_64-w64-mingw32-g++-posix -std=c++20 -O1 -Wall -Wextra -Werror -static tests/platforms/feed.cpp -o "$work/feed.exe"
+    tests/platforms/console.py "$PWD/build/wine" build/windows/htvm.exe "$work/longer" "$work/console.htvm" "$here" "$work/feed.exe"
     seen+="; progress and Ctrl-C at a console; opens a browser"
 fi
 
