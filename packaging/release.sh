@@ -3,7 +3,7 @@
 # From what is committed: the source archive, Python's source distribution, Debian's source package, the changes since
 # the last version. From what is built: wheels, npm packages, Debian packages, the C library for ARM and Windows, htvm.exe; it says
 # what it has not found, and which command makes it. Then the sizes of all, and their checksums (SHA256SUMS).
-# The same commit and the same builds give the same bytes.
+# The same commit and the same builds give the same bytes. Builds whose sources have changed since are brought up to date.
 set -euo pipefail
 out=${1:?usage: packaging/release.sh FOLDER}
 mkdir -p "$out"
@@ -14,6 +14,19 @@ git diff --quiet HEAD || echo "Warning: what is not committed is not in the sour
 version=$(grep -oE 'HTVM_VERSION_(MAJOR|MINOR|PATCH) [0-9]+' include/htvm/htvm.h | cut -d' ' -f2 | paste -sd.)
 stamp=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH=$stamp # what DLLs say when they were linked or stripped
+# No release has what was built before its sources changed.
+for build in package aarch64 windows; do
+    [ -f "build/$build/build.ninja" ] || continue
+    case $build in
+        package) targets=(all) ;;
+        aarch64) targets=(htvm_c_shared htvm_python) ;;
+        windows) targets=(htvm_c_shared htvm_python htvm) ;;
+    esac
+    cmake --build "build/$build" --target "${targets[@]}" >&2
+done
+for file in build/package/*.deb; do
+    [ ! -f "$file" ] || [ ! "$file" -ot build/package/htvm ] || { echo "$file is older than what it packs: ./dev package makes it anew" >&2; exit 1; }
+done
 missing() { echo "left out: $1 ($2 makes it)"; }
 
 # pack NAME FOLDER: an archive of the folder's files, the same bytes whenever it is made.
