@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -54,6 +55,13 @@ void set(EbSvtAv1EncConfiguration& settings, const PictureEncoderOptions& option
     settings.logical_processors = options.threads;
 }
 
+// Held where a coder begins or ends: SVT-AV1 then sets up and takes down what all coders of a program share, and two at
+// once, as of chunks that are encoded side by side, leave its memory in disorder.
+std::mutex& one_at_a_time() {
+    static std::mutex mutex;
+    return mutex;
+}
+
 }  // namespace
 
 bool can_foresee(std::uint32_t width, std::uint32_t height) {
@@ -69,6 +77,7 @@ struct ForeseeingAv1::State {
     State(const State&) = delete;
     State& operator=(const State&) = delete;
     ~State() {
+        const std::lock_guard lock(one_at_a_time());
         if (open) svt_av1_enc_deinit(encoder);
         if (encoder) svt_av1_enc_deinit_handle(encoder);
     }
@@ -98,6 +107,7 @@ ForeseeingAv1::~ForeseeingAv1() = default;
 
 Result<ForeseeingAv1> ForeseeingAv1::create(const PictureEncoderOptions& options) {
     auto state = std::make_unique<State>();
+    const std::lock_guard lock(one_at_a_time());  // behind the state, whose end takes it, too
     const auto before = threads_before_all_else();
     if (const auto made = svt_av1_enc_init_handle(&state->encoder, nullptr, &state->settings); made != EB_ErrorNone)
         return refused("gives no coder", made);

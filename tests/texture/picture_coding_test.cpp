@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <thread>
 #include <vector>
 
 #include "htvm/picture_decoder.hpp"
@@ -268,6 +270,21 @@ TEST(PicturesWithForesight, AreCodedFromAKeyPictureOnAsIfTheyBeganThere) {
     const auto whole = coded(foreseeing(), 20, {9});
     const auto part = coded(foreseeing(), 11, {}, later_waves);
     for (std::size_t i = 0; i < part.size(); ++i) EXPECT_EQ(part[i].payload, whole[9 + i].payload) << i;
+}
+
+TEST(PicturesWithForesight, AreTheSameBytesFromEncodersSideBySide) {
+    const auto alone = coded(foreseeing(), 2);
+    std::vector<std::thread> encoders;
+    std::atomic<int> same = 0;
+    constexpr int at_once = 6, times = 8;
+    for (int k = 0; k < at_once; ++k)
+        encoders.emplace_back([&] {
+            auto options = foreseeing();
+            options.threads = 1;
+            for (int time = 0; time < times; ++time) same += coded(options, 2)[1].payload == alone[1].payload;
+        });
+    for (auto& encoder : encoders) encoder.join();
+    EXPECT_EQ(same, at_once * times);
 }
 
 TEST(PicturesWithForesight, ShowWhatStaysBelowNoiseBetterAndTakeFewerBits) {
