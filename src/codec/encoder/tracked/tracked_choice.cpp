@@ -289,9 +289,10 @@ Result<std::optional<Frame>> patch_as_planned(const TrackedWork& work, const Nod
 
 // A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the reference's mesh can
 // no longer follow, so that part of it is replaced, or an I-frame is sent. An I-frame is also sent once a T-frame takes
-// more bits than the last I-frame did, if the shortest key interval has passed. Where one is due for those who join
-// late, it is made of the tracked mesh, so that nothing jumps. A frame that may not be repaired is sent as it is, and
-// so is one whose motion alone is wanted, unless it falls apart.
+// more bits than the last I-frame did, if the shortest key interval has passed, and where a capture that is tracked
+// already is begun anew, if that pays. Where one is due for those who join late, it is made of the tracked mesh, so
+// that nothing jumps. A frame that may not be repaired is sent as it is, and so is one whose motion alone is wanted,
+// unless it falls apart.
 Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {
     const bool due = intra_is_due(work);
     const auto& history = work.sequence.history;
