@@ -20,16 +20,13 @@ bool may_begin_anew(const TrackedWork& work) {
 
 double error_of(const TrackedWork& work, const CodedMotion& frame) {
     StageClock clock(work.stages);
-    const double out =
-        errors_between(work.captured.mesh, work.surface, detailed(work.reference->decoded.detail, frame.encoded.mesh),
-                       work.configuration.threads)
-            .geometry_rms;
+    const double out = errors_shown(work, frame.encoded.mesh, work.reference->decoded.detail).geometry_rms;
     clock.done("fit of the tracking");
     return out;
 }
 
-// By how much the I-frame changes the price of the frames that it will serve, as many as are expected:
-// the logarithm of bits where the error is equal, since a bit that is saved brings so much.
+// By how much the I-frame changes the price of the frames that it will serve, as many as are expected: the logarithm of
+// bits where the error is equal, since a bit that is saved brings so much.
 double change_of_price(const TrackedWork& work, const FollowedCapture& followed, double error_now) {
     const auto& reference = *work.reference;
     const auto served = static_cast<double>(work.sequence.next_frame - reference.intra_frame);

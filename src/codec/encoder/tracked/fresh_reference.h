@@ -17,9 +17,9 @@ FollowedCapture followed_on(FollowedCapture followed, double vertices_again);
 FollowedCapture followed_from_intra(FollowedCapture followed);
 
 // The I-frame that is worth its bytes in place of this T-frame, where the capture is begun anew with it; nothing if
-// there is none, or if bits, errors or times are asked for that such I-frames would upset. lost: whether
-// it does not fit. steps: asked for. followed: of this frame; goes on with what is found. Few frames are measured, each
-// in half of a T-frame's time.
+// there is none, or if bits, errors or times are asked for that such I-frames would upset. lost: whether it does not
+// fit. steps: asked for. followed: of this frame; goes on with what is found. Few frames are measured, each in half of
+// a T-frame's time.
 Result<std::optional<TrackedIntra>> fresh_reference(const TrackedWork& work, const CodedMotion& frame, bool lost,
                                                     const FrameSteps& steps, FollowedCapture& followed);
 

@@ -410,9 +410,7 @@ Result<Frame> code_stand_in(const TrackedWork& work, Tracking& tracking, const F
 }
 
 SurfaceErrors errors_of(const TrackedWork& work, const CodedFrame& frame) {
-    const auto& detail = detail_of(frame, work.reference ? &work.reference->decoded : nullptr);
-    return errors_between(work.captured.mesh, work.surface, detailed(detail, frame.decoded),
-                          work.configuration.threads);
+    return errors_shown(work, frame.decoded, detail_of(frame, work.reference ? &work.reference->decoded : nullptr));
 }
 
 }  // namespace htvm::internal

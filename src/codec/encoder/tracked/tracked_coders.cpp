@@ -220,8 +220,7 @@ bool codes_levels(const TrackedWork& work, const LatticeMesh& simple) {
 
 // What a coding of the same surface costs: the logarithm of bits where the error is equal.
 double price_of(const TrackedWork& work, const CodedFrame& frame) {
-    const auto errors = errors_between(work.captured.mesh, work.surface, detailed(frame.detail, frame.decoded),
-                                       work.configuration.threads);
+    const auto errors = errors_shown(work, frame.decoded, frame.detail);
     return std::log(static_cast<double>(frame.bytes())) +
            tracking_numbers.bits_by_error * std::log(std::max(errors.geometry_rms, 1e-6));
 }

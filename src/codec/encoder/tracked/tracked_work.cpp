@@ -175,6 +175,10 @@ TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double re
     return out;
 }
 
+SurfaceErrors errors_shown(const TrackedWork& work, const LatticeMesh& decoded, const SurfaceDetail& detail) {
+    return errors_between(work.captured.mesh, work.surface, detailed(detail, decoded), work.configuration.threads);
+}
+
 std::vector<Colour> colours_at(const TrackedWork& work, const LatticeMesh& decoded) {
     const auto& colours = work.captured.colours;
     if (colours.empty()) return {};

@@ -216,6 +216,9 @@ struct KnownOfFit {
 // Whether a decoded mesh still represents the captured one.
 TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double reference_edge, const KnownOfFit& known);
 
+// The distance between the captured surface and a decoded mesh, shown with this detail, in both directions.
+SurfaceErrors errors_shown(const TrackedWork& work, const LatticeMesh& decoded, const SurfaceDetail& detail);
+
 // What is seen of CapturedFrame::colours at the vertices of a decoded mesh; none without those.
 std::vector<Colour> colours_at(const TrackedWork& work, const LatticeMesh& decoded);
 
